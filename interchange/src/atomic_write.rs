@@ -1,0 +1,162 @@
+//! Writing a file so that nobody ever sees half of it: beside the target, synced, renamed. Output identical to
+//! the file that is already there leaves that file alone, time stamp included, so that `make` can stop there.
+
+use crate::error::{Error, Result};
+use std::fs::{File, OpenOptions};
+use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
+use std::path::Path;
+
+/// Whether the target changed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// A new file stands at the path.
+    Written,
+    /// The old file held the same bytes and was left alone.
+    Unchanged,
+}
+
+/// Writes what `fill` produces to `path`. On any error the old file is untouched.
+pub fn write(path: &Path, fill: impl FnOnce(&mut dyn WriteSeek) -> std::io::Result<()>) -> Result<Outcome> {
+    let io = |action| move |e| Error::io(path, action, e);
+    if path.is_dir() {
+        return Err(Error::io(path, "write", std::io::ErrorKind::IsADirectory.into()));
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let mut partial = tempfile::Builder::new()
+        .prefix(&format!(".{name}."))
+        .suffix(".partial")
+        .tempfile_in(folder)
+        .map_err(io("write beside"))?;
+
+    let mut buffered = BufWriter::with_capacity(1 << 20, partial.as_file_mut());
+    fill(&mut buffered).map_err(io("write"))?;
+    buffered.flush().map_err(io("write"))?;
+    drop(buffered);
+
+    if same_bytes(partial.as_file_mut(), path).map_err(io("compare with"))? {
+        return Ok(Outcome::Unchanged);
+    }
+    set_normal_permissions(partial.as_file(), path).map_err(io("set permissions of"))?;
+    partial.as_file().sync_all().map_err(io("sync"))?;
+    partial.persist(path).map_err(|e| Error::io(path, "rename to", e.error))?;
+    sync_folder(folder);
+    Ok(Outcome::Written)
+}
+
+/// A sink that can go back to fill in what it only knows at the end.
+pub trait WriteSeek: Write + Seek {}
+impl<T: Write + Seek> WriteSeek for T {}
+
+/// Writes `bytes` to `path`, as [`write`] does.
+pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<Outcome> {
+    write(path, |out| out.write_all(bytes))
+}
+
+/// Whether `path` exists and holds exactly the bytes of `new`.
+fn same_bytes(new: &mut File, path: &Path) -> std::io::Result<bool> {
+    let old = match File::open(path) {
+        Ok(old) => old,
+        Err(_) => return Ok(false),
+    };
+    if old.metadata()?.len() != new.metadata()?.len() {
+        return Ok(false);
+    }
+    new.seek(SeekFrom::Start(0))?;
+    let (mut old, mut new) = (BufReader::with_capacity(1 << 20, old), BufReader::with_capacity(1 << 20, new));
+    let (mut old_chunk, mut new_chunk) = (vec![0; 1 << 16], vec![0; 1 << 16]);
+    loop {
+        let read = new.read(&mut new_chunk)?;
+        if read == 0 {
+            return Ok(true);
+        }
+        if old.read_exact(&mut old_chunk[..read]).is_err() || old_chunk[..read] != new_chunk[..read] {
+            return Ok(false);
+        }
+    }
+}
+
+/// Gives the new file the permissions of the one it replaces, or those any new file would get (a temporary file
+/// is readable by its owner only).
+#[cfg(unix)]
+fn set_normal_permissions(file: &File, path: &Path) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    let mode = match std::fs::metadata(path) {
+        Ok(old) => old.permissions().mode(),
+        Err(_) => new_file_mode(path)?,
+    };
+    file.set_permissions(std::fs::Permissions::from_mode(mode & 0o777))
+}
+
+/// The mode that this process's umask leaves of 0666, learnt from a file made and removed beside the target
+/// (asking for the umask itself means changing it, which other threads would see).
+#[cfg(unix)]
+fn new_file_mode(path: &Path) -> std::io::Result<u32> {
+    use std::os::unix::fs::PermissionsExt;
+    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let sample = path.with_file_name(format!(".{name}.{}.mode", std::process::id()));
+    let file = OpenOptions::new().write(true).create(true).truncate(true).open(&sample)?;
+    let mode = file.metadata()?.permissions().mode();
+    std::fs::remove_file(&sample)?;
+    Ok(mode)
+}
+
+#[cfg(not(unix))]
+fn set_normal_permissions(_: &File, _: &Path) -> std::io::Result<()> {
+    Ok(())
+}
+
+/// Makes the rename itself durable where the file system supports it; a failure here loses no data.
+fn sync_folder(folder: &Path) {
+    if let Ok(folder) = File::open(folder) {
+        let _ = folder.sync_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn identical_output_leaves_the_old_file_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        assert_eq!(write_bytes(&path, b"one").unwrap(), Outcome::Written);
+        let before = std::fs::metadata(&path).unwrap().modified().unwrap();
+        assert_eq!(write_bytes(&path, b"one").unwrap(), Outcome::Unchanged);
+        assert_eq!(std::fs::metadata(&path).unwrap().modified().unwrap(), before);
+        assert_eq!(write_bytes(&path, b"two").unwrap(), Outcome::Written);
+        assert_eq!(std::fs::read(&path).unwrap(), b"two");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn failed_write_leaves_the_old_file_and_no_litter() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        write_bytes(&path, b"old").unwrap();
+        let failed = write(&path, |out| {
+            out.write_all(b"new")?;
+            Err(std::io::ErrorKind::StorageFull.into())
+        });
+        assert!(failed.unwrap_err().to_string().contains("free some space"));
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn new_files_are_readable_as_the_umask_says_and_old_modes_are_kept() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let (path, plain) = (folder.path().join("a.txt"), folder.path().join("plain.txt"));
+        std::fs::write(&plain, "x").unwrap();
+        write_bytes(&path, b"one").unwrap();
+        let mode = |p: &Path| std::fs::metadata(p).unwrap().permissions().mode() & 0o777;
+        assert_eq!(mode(&path), mode(&plain));
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o640)).unwrap();
+        write_bytes(&path, b"two").unwrap();
+        assert_eq!(mode(&path), 0o640);
+    }
+}

@@ -1,0 +1,61 @@
+//! The scene as its author wrote it: OBJ geometry, MTL materials, and the optional toml beside them.
+
+mod mtl;
+mod obj;
+mod obj_scan;
+mod settings;
+
+pub use settings::{CameraSettings, Settings};
+
+use crate::digest::Digest;
+use crate::error::Result;
+use crate::ids::{GroupId, MaterialId};
+use crate::materials::MaterialTable;
+use std::path::{Path, PathBuf};
+
+/// Name of the built-in material of faces before any `usemtl`, and of the group of faces before any `g` or `o`.
+pub const NONE: &str = "(none)";
+
+/// A polygon of the scene.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SceneFace {
+    /// Indices into the scene's vertices, at least 3, front counter-clockwise. Zero-area and repeated corners may occur.
+    pub corners: Vec<u32>,
+    /// Group.
+    pub group: GroupId,
+    /// Material.
+    pub material: MaterialId,
+    /// Line of the OBJ it stands on, from 1.
+    pub line: usize,
+}
+
+/// A scene read from files: finite coordinates, valid indices, known materials.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// The OBJ file.
+    pub path: PathBuf,
+    /// Identity of the OBJ file.
+    pub digest: Digest,
+    /// MTL files it names, in order.
+    pub material_files: Vec<PathBuf>,
+    /// Vertex positions.
+    pub vertices: Vec<[f64; 3]>,
+    /// Faces in file order.
+    pub faces: Vec<SceneFace>,
+    /// Group names in order of first appearance.
+    pub groups: Vec<String>,
+    /// Materials that faces use, in order of first use; two-sided ones marked.
+    pub materials: MaterialTable,
+    /// Contents of the toml, defaults where there is none.
+    pub settings: Settings,
+    /// What the author should look at: to be reported by the tool.
+    pub warnings: Vec<String>,
+}
+
+impl Scene {
+    /// Reads `path` (OBJ), the MTL files it names and `NAME.toml` beside it where that exists.
+    /// Materials named in `two_sided` are two-sided besides those the toml lists.
+    pub fn read(path: &Path, two_sided: &[String]) -> Result<Scene> {
+        obj::read(path, two_sided)
+    }
+}

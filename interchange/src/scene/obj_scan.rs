@@ -1,0 +1,1 @@
+//! Scan of an OBJ file.

@@ -1,0 +1,82 @@
+//! Command-line habits the four tools share: flags, talk on stderr, progress on a terminal, exit codes.
+//!
+//! Exit codes: 0 done; 1 failed; 2 bad usage (clap's); 3 finished and written, but the asked tolerance was not reached.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::fmt::Display;
+use std::io::IsTerminal;
+use std::process::ExitCode;
+
+/// Flags every subcommand takes. None of them changes an output.
+#[derive(Debug, Clone, clap::Args)]
+pub struct Common {
+    /// Threads to use (default: one per core); the output does not depend on it
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub threads: Option<u32>,
+    /// Say only errors
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+    /// Say what is being done
+    #[arg(long, short, global = true, conflicts_with = "quiet")]
+    pub verbose: bool,
+}
+
+impl Common {
+    /// Sets up talk on stderr and the thread pool; to be called once, first.
+    pub fn start(&self) {
+        let level = match (self.quiet, self.verbose) {
+            (true, _) => tracing::Level::ERROR,
+            (_, true) => tracing::Level::DEBUG,
+            _ => tracing::Level::WARN,
+        };
+        let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none();
+        let talk = tracing_subscriber::fmt().with_writer(std::io::stderr).with_max_level(level);
+        // A second start in one process keeps the first one's settings.
+        let _ = talk.without_time().with_target(false).with_ansi(colours).try_init();
+        let threads = self.threads.unwrap_or(0) as usize;
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    }
+
+    /// A bar for `steps` of work on a terminal, nothing elsewhere or with `--quiet`.
+    pub fn progress(&self, title: &'static str, steps: usize) -> ProgressBar {
+        if self.quiet || !std::io::stderr().is_terminal() {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::with_draw_target(Some(steps as u64), ProgressDrawTarget::stderr());
+        let style = ProgressStyle::with_template("{prefix} [{wide_bar}] {percent} % {eta}");
+        bar.with_prefix(title).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+    }
+}
+
+/// How a run that wrote its output ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Finish {
+    /// As asked.
+    Done,
+    /// Written, but the asked tolerance was not reached: what was asked, what was reached, what would help.
+    ToleranceMissed(String),
+}
+
+/// Says how the run ended and turns it into the exit code.
+pub fn exit_code<E: Display>(tool: &str, result: Result<Finish, E>) -> ExitCode {
+    match result {
+        Ok(Finish::Done) => ExitCode::SUCCESS,
+        Ok(Finish::ToleranceMissed(message)) => {
+            eprintln!("{tool}: warning: {message}");
+            ExitCode::from(3)
+        }
+        Err(error) => {
+            eprintln!("{tool}: error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Prints data on stdout; a reader that has gone away (`| head`) is no failure.
+pub fn print_data(text: &str) -> std::io::Result<()> {
+    use std::io::Write;
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        other => other,
+    }
+}

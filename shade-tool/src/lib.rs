@@ -1,0 +1,1 @@
+//! Radiosity to pictures and points.

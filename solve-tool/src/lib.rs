@@ -1,0 +1,1 @@
+//! Exchange matrix and materials to radiosity.
