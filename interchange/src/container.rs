@@ -418,7 +418,7 @@ mod tests {
                 continue;
             }
             let mut flipped = good.clone();
-            flipped[byte] ^= 1 << (bit % 8);
+            flipped[bit / 8] ^= 1 << (bit % 8);
             std::fs::write(&bad, &flipped).unwrap();
             assert!(File::<u32>::open(&bad, Kind::Mesh).is_err(), "bit {bit}");
         }
