@@ -5,5 +5,12 @@
 
 #![forbid(unsafe_code)]
 
+pub mod area_rule;
+pub mod contour;
+pub mod edge_pair;
+pub mod patch;
 pub mod plane;
+pub mod point_factor;
 pub mod polygon;
+pub mod quadrature;
+pub mod unoccluded;
