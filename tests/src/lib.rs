@@ -7,6 +7,7 @@ pub mod damage;
 pub mod pipeline;
 pub mod programs;
 pub mod table;
+pub mod two_squares;
 
 pub use close::{Tolerance, assert_close};
 pub use programs::{Run, TOOLS, program, run, tool};

@@ -16,7 +16,7 @@ pub fn program(name: &str) -> PathBuf {
     let folder = FOLDER.get_or_init(|| {
         let folder = profile_folder();
         let stale = |tool: &&str| modified(&folder.join(tool)).is_none_or(|built| built < newest_source());
-        if TOOLS.iter().any(|tool| stale(tool)) {
+        if TOOLS.iter().any(stale) {
             build(&folder);
         }
         folder
