@@ -37,7 +37,11 @@ impl Cone {
     fn around(to_centre: DVec3, radius: f64) -> Option<Cone> {
         let distance = to_centre.length();
         let sine = radius / distance;
-        (sine < 1.0).then(|| Cone { direction: to_centre / distance, cosine: (1.0 - sine * sine).sqrt(), sine })
+        (sine < 1.0).then(|| Cone {
+            direction: to_centre / distance,
+            cosine: (1.0 - sine * sine).sqrt(),
+            sine,
+        })
     }
 
     /// Whether two cones may share a direction: cos of the angle between against cos of the sum of the half angles.
@@ -50,11 +54,14 @@ impl Gatherer {
     /// Prepares convex `occluders` with the faces they are pieces of, and convex `elements`, one-sided, front
     /// counter-clockwise. Elements and occluders without area take no part.
     pub fn new(occluders: Vec<Vec<DVec3>>, occluder_faces: Vec<u32>, elements: Vec<Vec<DVec3>>) -> Gatherer {
-        let occluders: Vec<Occluder> =
-            occluders.into_iter().zip(occluder_faces).filter_map(|(c, face)| Occluder::new(c, face)).collect();
+        let occluders: Vec<Occluder> = occluders
+            .into_iter()
+            .zip(occluder_faces)
+            .filter_map(|(c, face)| Occluder::new(c, face))
+            .collect();
         let prepare = |(index, corners): (usize, Vec<DVec3>)| {
             let patch = Patch::new(corners)?;
-            let bits = SideBits::new(&patch.corners, &patch.plane, patch.radius, &occluders);
+            let bits = SideBits::of_patch(&patch.corners, &patch.plane, patch.radius, &occluders);
             Some((index, patch, bits))
         };
         let elements = elements.into_iter().enumerate().filter_map(prepare).collect();
@@ -76,7 +83,7 @@ impl Gatherer {
         visit: &mut dyn FnMut(usize, f64),
     ) {
         let plane = Plane { normal, origin: point };
-        let sides = SideBits::new(&[point], &plane, 0.0, &self.occluders);
+        let sides = SideBits::of_point(&plane, &self.occluders);
         let Scratch { visible, cut, cones } = scratch;
         cones.clear();
         cones.extend(self.occluders.iter().map(|o| Cone::around(o.centre - point, o.radius)));
@@ -109,6 +116,53 @@ impl Gatherer {
             };
             if factor > 0.0 {
                 visit(*index, factor);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cube_faces(low: f64, high: f64, inward: bool) -> Vec<Vec<DVec3>> {
+        let (a, b) = (low, high);
+        let faces = [
+            [(a, a, a), (b, a, a), (b, b, a), (a, b, a)],
+            [(a, b, b), (b, b, b), (b, a, b), (a, a, b)],
+            [(a, a, a), (a, b, a), (a, b, b), (a, a, b)],
+            [(b, a, b), (b, b, b), (b, b, a), (b, a, a)],
+            [(a, a, a), (a, a, b), (b, a, b), (b, a, a)],
+            [(b, b, a), (b, b, b), (a, b, b), (a, b, a)],
+        ];
+        let mut faces: Vec<Vec<DVec3>> =
+            faces.iter().map(|f| f.iter().map(|&(x, y, z)| DVec3::new(x, y, z)).collect()).collect();
+        if !inward {
+            faces.iter_mut().for_each(|face| face.reverse());
+        }
+        faces
+    }
+
+    /// In a closed room with a box inside, whatever the point sees adds up to everything.
+    #[test]
+    fn factors_close_in_a_room_with_a_box_at_any_scale() {
+        for scale in [1e-6, 1.0, 1e6] {
+            let mut faces = cube_faces(0.0, scale, true);
+            faces.extend(cube_faces(0.25 * scale, 0.75 * scale, false));
+            let ids: Vec<u32> = (0..faces.len() as u32).collect();
+            let gatherer = Gatherer::new(faces.clone(), ids, faces);
+            let mut scratch = Scratch::default();
+            for (point, normal, face) in [
+                (DVec3::new(0.3, 0.4, 0.0), DVec3::Z, 0),
+                (DVec3::new(0.1, 0.9, 0.0), DVec3::Z, 0),
+                (DVec3::new(0.5, 0.5, 0.75), DVec3::Z, 7),
+                (DVec3::new(1e-7, 1e-7, 0.0), DVec3::Z, 0),
+                (DVec3::new(0.25, 0.5, 0.74999), DVec3::NEG_X, 8),
+            ] {
+                let mut sum = 0.0;
+                gatherer
+                    .factors(point * scale, normal, Some(face), &mut scratch, &mut |_, factor| sum += factor);
+                assert!((sum - 1.0).abs() < 1e-12, "{point} at scale {scale}: {sum}");
             }
         }
     }

@@ -130,7 +130,8 @@ pub fn exchange(
     let (value, error) = view.weak(&receiver.corners);
     let mut error_sum = error;
     let mut serial = 0;
-    let mut queue = BinaryHeap::from([Cell { corners: receiver.corners.clone(), value, error, strong: false, serial }]);
+    let mut queue =
+        BinaryHeap::from([Cell { corners: receiver.corners.clone(), value, error, strong: false, serial }]);
     let planes = if error > tolerance { shadow_planes(&source.corners, blockers) } else { Vec::new() };
     // Summing up the queue afresh would be exact but slow: the running sum is corrected when it matters.
     while error_sum > tolerance && view.evaluations < most_evaluations {
@@ -205,7 +206,8 @@ fn halves(cell: &[DVec3], height: impl Fn(DVec3) -> f64) -> (Vec<DVec3>, Vec<DVe
 /// Cuts a cell across its longest extent, through its centroid.
 fn bisect(cell: &[DVec3]) -> (Vec<DVec3>, Vec<DVec3>) {
     let centroid = polygon::centroid(cell);
-    let farthest = cell.iter().map(|&c| c - centroid).max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
+    let farthest =
+        cell.iter().map(|&c| c - centroid).max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
     let across = farthest.unwrap_or(DVec3::X);
     halves(cell, |p| across.dot(p - centroid))
 }

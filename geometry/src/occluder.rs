@@ -36,7 +36,10 @@ impl Occluder {
     pub fn covers(&self, p: &[DVec3], q: &[DVec3]) -> bool {
         let heights = |points: &[DVec3]| {
             let range = (f64::INFINITY, f64::NEG_INFINITY);
-            points.iter().map(|&x| self.plane.distance(x)).fold(range, |(low, high), h| (low.min(h), high.max(h)))
+            points
+                .iter()
+                .map(|&x| self.plane.distance(x))
+                .fold(range, |(low, high), h| (low.min(h), high.max(h)))
         };
         let ((low_p, high_p), (low_q, high_q)) = (heights(p), heights(q));
         let apart = (low_p > 0.0 && high_q < 0.0) || (high_p < 0.0 && low_q > 0.0);
@@ -168,7 +171,9 @@ mod tests {
     use super::*;
 
     fn square(half: f64, z: f64) -> Vec<DVec3> {
-        [(-half, -half), (half, -half), (half, half), (-half, half)].map(|(x, y)| DVec3::new(x, y, z)).to_vec()
+        [(-half, -half), (half, -half), (half, half), (-half, half)]
+            .map(|(x, y)| DVec3::new(x, y, z))
+            .to_vec()
     }
 
     #[test]
@@ -185,7 +190,9 @@ mod tests {
         let shaft: Vec<DVec3> = square(1.0, 0.0).into_iter().chain(square(1.0, 2.0)).collect();
         for scale in [1e-6, 1.0, 1e6] {
             let scaled = |points: &[DVec3]| points.iter().map(|&p| p * scale).collect::<Vec<_>>();
-            let at = |x: f64| scaled(&square(0.5, 1.0).iter().map(|&p| p + DVec3::new(x, 0.3, 0.0)).collect::<Vec<_>>());
+            let at = |x: f64| {
+                scaled(&square(0.5, 1.0).iter().map(|&p| p + DVec3::new(x, 0.3, 0.0)).collect::<Vec<_>>())
+            };
             assert!(separated(&scaled(&shaft), &at(1.6)));
             assert!(separated(&scaled(&shaft), &at(-1.51)));
             assert!(!separated(&scaled(&shaft), &at(1.4)));

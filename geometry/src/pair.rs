@@ -82,7 +82,8 @@ fn exchange_in_front<'a>(
     let (receiver, source) = if q.area < p.area { (q, p) } else { (p, q) };
     let unblocked = unblocked_size(p, q);
     let tolerance = accuracy.occluded * unblocked;
-    let (found, effort) = occluded::exchange(receiver, source, blockers, tolerance, accuracy.most_evaluations, scratch);
+    let (found, effort) =
+        occluded::exchange(receiver, source, blockers, tolerance, accuracy.most_evaluations, scratch);
     (found, Class::Occluded(effort))
 }
 

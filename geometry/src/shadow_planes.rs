@@ -60,7 +60,8 @@ impl ShadowPlane {
     /// The shares in which the plane cuts the polygon's corners' heights (the smaller one, 0 to 1/2), where it cuts it
     /// by more than `tolerance` (a length) on both sides and the event can be seen from the cut; `None` elsewhere.
     pub fn cut_balance(&self, cell: &[DVec3], tolerance: f64) -> Option<f64> {
-        let (low, high) = cell.iter().map(|&c| self.height(c)).fold((0.0f64, 0.0f64), |(l, h), x| (l.min(x), h.max(x)));
+        let (low, high) =
+            cell.iter().map(|&c| self.height(c)).fold((0.0f64, 0.0f64), |(l, h), x| (l.min(x), h.max(x)));
         if -low <= tolerance || high <= tolerance {
             return None;
         }

@@ -8,6 +8,10 @@ use crate::occluder::Occluder;
 use crate::plane::{PLANARITY, Plane};
 use glam::DVec3;
 
+/// A point this close to an occluder's plane (in units of the occluder's size) has no side: rounding of its height.
+/// Far below the distance that nodes are moved inward from a contact line.
+const POINT_ROUNDING: f64 = 1e-13;
+
 /// Bits of one receiver, one per occluder.
 #[derive(Debug, Clone, Default)]
 pub struct SideBits {
@@ -20,13 +24,28 @@ pub struct SideBits {
 }
 
 impl SideBits {
-    /// Facts of a receiver with these corners (one for a point), plane and size.
-    pub fn new(corners: &[DVec3], plane: &Plane, radius: f64, occluders: &[Occluder]) -> Self {
+    /// Facts of a patch with these corners, plane and size.
+    pub fn of_patch(corners: &[DVec3], plane: &Plane, radius: f64, occluders: &[Occluder]) -> Self {
+        Self::new(corners, plane, occluders, |occluder| PLANARITY * (occluder.radius + radius))
+    }
+
+    /// Facts of a point on a plane.
+    pub fn of_point(plane: &Plane, occluders: &[Occluder]) -> Self {
+        Self::new(&[plane.origin], plane, occluders, |occluder| POINT_ROUNDING * occluder.radius)
+    }
+
+    /// `closeness` is the height over an occluder's plane that counts as none.
+    fn new(
+        corners: &[DVec3],
+        plane: &Plane,
+        occluders: &[Occluder],
+        closeness: impl Fn(&Occluder) -> f64,
+    ) -> Self {
         let words = occluders.len().div_ceil(64);
         let mut bits = Self { front: vec![0; words], back: vec![0; words], beneath: vec![0; words] };
         for (k, occluder) in occluders.iter().enumerate() {
             let (word, bit) = (k / 64, 1u64 << (k % 64));
-            let tolerance = PLANARITY * (occluder.radius + radius);
+            let tolerance = closeness(occluder);
             let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
             for &corner in corners {
                 let height = occluder.plane.distance(corner);
@@ -38,7 +57,7 @@ impl SideBits {
             if high <= tolerance {
                 bits.back[word] |= bit;
             }
-            if occluder.corners.iter().all(|&c| plane.distance(c) <= tolerance) {
+            if occluder.corners.iter().all(|&c| plane.distance(c) <= PLANARITY * occluder.radius) {
                 bits.beneath[word] |= bit;
             }
         }

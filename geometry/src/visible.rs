@@ -110,8 +110,9 @@ mod tests {
     use super::*;
 
     fn square(half: f64, z: f64, down: bool) -> Vec<DVec3> {
-        let mut corners =
-            [(-half, -half), (half, -half), (half, half), (-half, half)].map(|(x, y)| DVec3::new(x, y, z)).to_vec();
+        let mut corners = [(-half, -half), (half, -half), (half, half), (-half, half)]
+            .map(|(x, y)| DVec3::new(x, y, z))
+            .to_vec();
         if down {
             corners.reverse();
         }
