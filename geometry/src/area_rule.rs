@@ -114,7 +114,12 @@ mod tests {
                 continue;
             }
             let exact = contour(&p.corners, &q.corners, 1e-15);
-            let product = |n| (RulePoints::new(&p.corners, Strength::Product(n)), RulePoints::new(&q.corners, Strength::Product(n)));
+            let product = |n| {
+                (
+                    RulePoints::new(&p.corners, Strength::Product(n)),
+                    RulePoints::new(&q.corners, Strength::Product(n)),
+                )
+            };
             let ((a, b), (c, d)) = (product(4), product(5));
             let rules = [
                 (Strength::Centroid, &p.centre, &q.centre),

@@ -142,9 +142,16 @@ struct Panel {
     depth: u32,
 }
 
-fn integrate_panels(outer: &Edge, inner: &Edge, singularities: &[Singularity], panel: Panel, tolerance: f64) -> f64 {
+fn integrate_panels(
+    outer: &Edge,
+    inner: &Edge,
+    singularities: &[Singularity],
+    panel: Panel,
+    tolerance: f64,
+) -> f64 {
     let (centre, half) = (0.5 * (panel.start + panel.end), 0.5 * (panel.end - panel.start));
-    let nearest = singularities.iter().map(|s| (s.ellipse(centre, half), s)).min_by(|a, b| a.0.total_cmp(&b.0));
+    let nearest =
+        singularities.iter().map(|s| (s.ellipse(centre, half), s)).min_by(|a, b| a.0.total_cmp(&b.0));
     let Some((rho, nearest)) = nearest else { return 0.0 };
 
     // Points for the tolerance by Bernstein's bound; next to a singularity of the kind x ln x the remainder of a panel

@@ -69,8 +69,9 @@ impl Patch {
 
     /// Least and largest height of this patch's corners over `plane`.
     pub fn heights_over(&self, plane: &Plane) -> (f64, f64) {
-        self.corners.iter().map(|&c| plane.distance(c)).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| {
-            (low.min(h), high.max(h))
-        })
+        self.corners
+            .iter()
+            .map(|&c| plane.distance(c))
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), h| (low.min(h), high.max(h)))
     }
 }

@@ -57,15 +57,27 @@ mod tests {
     #[test]
     fn element_under_a_corner_and_close_under_the_centre() {
         let scratch = &mut Vec::new();
-        close(point_factor(DVec3::ZERO, DVec3::Z, &down_square(1.0), scratch), 0.138_531_605_994_892_996_78, 1e-15);
+        close(
+            point_factor(DVec3::ZERO, DVec3::Z, &down_square(1.0), scratch),
+            0.138_531_605_994_892_996_78,
+            1e-15,
+        );
         let centre = DVec3::new(0.5, 0.5, 0.0);
-        close(point_factor(centre, DVec3::Z, &down_square(1e-3), scratch), 0.999_996_726_771_548_184_34, 1e-15);
+        close(
+            point_factor(centre, DVec3::Z, &down_square(1e-3), scratch),
+            0.999_996_726_771_548_184_34,
+            1e-15,
+        );
     }
 
     #[test]
     fn element_that_cuts_the_polygon_with_its_horizon() {
         let (point, normal) = (DVec3::new(0.25, 0.75, 0.0), DVec3::ONE.normalize());
-        close(point_factor(point, normal, &down_square(0.5), &mut Vec::new()), 0.263_122_619_208_100_201, 1e-15);
+        close(
+            point_factor(point, normal, &down_square(0.5), &mut Vec::new()),
+            0.263_122_619_208_100_201,
+            1e-15,
+        );
     }
 
     #[test]

@@ -128,7 +128,12 @@ pub fn polygon_rule(corners: &[DVec3], strength: Strength, points: &mut Vec<DVec
 }
 
 /// Appends points and weights (which add up to the area) for a triangle.
-pub fn triangle_rule(triangle: [DVec3; 3], strength: Strength, points: &mut Vec<DVec3>, weights: &mut Vec<f64>) {
+pub fn triangle_rule(
+    triangle: [DVec3; 3],
+    strength: Strength,
+    points: &mut Vec<DVec3>,
+    weights: &mut Vec<f64>,
+) {
     let area = polygon::area(&triangle);
     let orbits: &[Orbit] = match strength {
         Strength::Centroid => &DEGREE_1,
@@ -198,7 +203,8 @@ mod tests {
         for n in 1..=LARGEST_GAUSS {
             let rule = gauss(n);
             for degree in (0..2 * n).step_by(2) {
-                let got: f64 = rule.points.iter().zip(&rule.weights).map(|(x, w)| w * x.powi(degree as i32)).sum();
+                let got: f64 =
+                    rule.points.iter().zip(&rule.weights).map(|(x, w)| w * x.powi(degree as i32)).sum();
                 assert!((got - 2.0 / (degree as f64 + 1.0)).abs() < 4e-15, "n {n} degree {degree}: {got}");
             }
         }

@@ -67,7 +67,8 @@ pub fn mutual_parts(p: &Patch, q: &Patch) -> Option<(Patch, Patch)> {
     polygon::clip_to_front(&p.corners, &q.plane, &mut part_p);
     polygon::clip_to_front(&q.corners, &p.plane, &mut part_q);
     // A sliver keeps its patch's plane: its own would be rounding.
-    let keep = |part: Vec<DVec3>, whole: &Patch| Patch::new(part).map(|part| Patch { plane: whole.plane, ..part });
+    let keep =
+        |part: Vec<DVec3>, whole: &Patch| Patch::new(part).map(|part| Patch { plane: whole.plane, ..part });
     Some((keep(part_p, p)?, keep(part_q, q)?))
 }
 
@@ -94,7 +95,8 @@ pub fn exchange_in_front(p: &Patch, q: &Patch, relative: f64) -> (Exchange, Rule
     {
         let error = separation.error(strength);
         if error <= allowed {
-            let value = kernel_sum(rule_points(p, rule), p.plane.normal, rule_points(q, rule), q.plane.normal);
+            let value =
+                kernel_sum(rule_points(p, rule), p.plane.normal, rule_points(q, rule), q.plane.normal);
             return (Exchange { value, error }, rule);
         }
     }
