@@ -116,4 +116,5 @@ pub fn assert_refused(done: &Run, file: &Path) {
     let errors: Vec<&str> = done.stderr.lines().filter(|line| line.contains(": error: ")).collect();
     assert!(errors.len() == 1, "one line with an error was expected: {}", done.stderr);
     assert!(errors[0].contains(&name), "{name} is not named in: {}", done.stderr);
+    assert!(errors[0].matches("os error").count() <= 1, "said twice: {}", done.stderr);
 }

@@ -127,7 +127,7 @@ fn what_is_usable_now_is_taken() {
         ("solve-tool solve a.ff --mesh a.mesh --solver direct -o a.sol", "a."),
         ("solve-tool export a.sol --mesh a.mesh --by element -o a.npy", "a."),
         ("shade-tool render a.sol --mesh a.mesh -o a.exr --png a.png --size 40x30", "a."),
-        ("shade-tool probe a.sol --mesh a.mesh --points p.csv -o a.csv", "a."),
+        ("shade-tool probe a.sol --mesh a.mesh --points p.csv -o a.csv", "p.csv"),
     ] {
         let done = exit(line).expect_code(1);
         assert!(done.stderr.contains(": error: ") && done.stderr.contains(file), "{line}: {}", done.stderr);

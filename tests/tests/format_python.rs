@@ -9,6 +9,7 @@ use interchange::solution::Solution;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use tests::chain::Chain;
 use tests::two_squares::{self, Files};
 use tests::{Run, Tolerance, assert_close, run};
 
@@ -191,6 +192,22 @@ fn python_reads_what_rust_writes() {
     assert_eq!(mesh["sections"]["groups"][1], "lamp é");
     let matrix = json(&reader, &files.matrix);
     assert_numbers("row sums", &matrix["row_sums"], [two_squares::FORM_FACTOR; 2]);
+}
+
+#[test]
+fn python_reads_what_the_tools_write() {
+    let folder = tests::folder();
+    let chain = Chain::new(tests::scene("cornell_blocks.obj"), folder.path(), 60);
+    chain.run_all();
+    let [mesh, materials, matrix, solution] =
+        ["mesh", "materials", "ff", "sol"].map(|ending| chain.path(ending));
+    let reader = reader(folder.path());
+    assert_same(&reader, &Files { mesh, materials, matrix, solution });
+    // Faces as given: polygons with other counts of corners and nodes.
+    let mut given = chain.clone();
+    given.mesh_flags.clear();
+    given.run_all();
+    assert_same_mesh(&json(&reader, &given.path("mesh")), &given.path("mesh"));
 }
 
 #[test]
