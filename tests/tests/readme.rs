@@ -1,0 +1,45 @@
+//! The walk through the files in README.md works as written, command by command.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::process::Command;
+use tests::table::Table;
+use tests::{program, run};
+
+/// The indented lines of README.md that begin with a tool's name, or prepare a file for one.
+fn commands() -> Vec<String> {
+    let text = tests::text(&tests::root().join("README.md"));
+    let lines = text.lines().filter_map(|line| line.strip_prefix("    ")).map(str::to_owned);
+    let starts = |line: &String| {
+        tests::TOOLS.iter().chain(&["printf"]).any(|word| line.starts_with(&format!("{word} ")))
+    };
+    lines.filter(starts).collect()
+}
+
+#[test]
+fn the_walk_through_the_files_works() {
+    let folder = tests::folder();
+    std::os::unix::fs::symlink(tests::root().join("tests"), folder.path().join("tests")).unwrap();
+    let bin = program("mesh-tool").parent().unwrap().to_owned();
+    let path = format!("{}:{}", bin.display(), std::env::var("PATH").unwrap_or_default());
+    let commands = commands();
+    for name in tests::TOOLS {
+        assert!(
+            commands.iter().any(|line| line.starts_with(&format!("{name} info "))),
+            "no {name} info in README.md"
+        );
+    }
+    for line in commands {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &line]).current_dir(folder.path()).env("PATH", &path);
+        let done = run(&mut shell);
+        assert!(done.code == Some(0), "{line}: exit {:?}: {}", done.code, done.stderr);
+        assert_eq!(done.stdout.is_empty(), !line.contains(" info "), "{line}: {}", done.stdout);
+    }
+
+    // What the text says of the tables.
+    let factors = Table::read(&folder.path().join("factors.csv"));
+    assert_eq!(factors.header[..2], ["group", "floor"]);
+    let probed = Table::read(&folder.path().join("lit.csv"));
+    assert_eq!(probed.header[6..], ["H_r", "H_g", "H_b"]);
+    assert!(probed.number(0, "H_r") > 0.0);
+}
