@@ -69,7 +69,6 @@ pub fn clean(scene: &Scene, report: &mut Report) -> Result<Cleaned> {
         };
         let deviation = positions.iter().map(|&p| plane.distance(p).abs()).fold(0.0, f64::max)
             / polygon::diameter(&positions);
-        largest_deviation = largest_deviation.max(deviation);
         let convex = polygon::is_convex(&positions, plane.normal, PLANARITY);
         if !convex {
             refuse_crossing(scene, given, &positions, &plane, tolerance)?;
@@ -90,6 +89,7 @@ pub fn clean(scene: &Scene, report: &mut Report) -> Result<Cleaned> {
             continue;
         }
         cut += 1;
+        largest_deviation = largest_deviation.max(fan_deviation(&positions));
         let pieces = if convex { fan(&corners) } else { triangles(scene, given, &corners, &places, &plane)? };
         for piece in pieces {
             match plane_of(&places.corners(&piece), tolerance) {
@@ -110,7 +110,7 @@ pub fn clean(scene: &Scene, report: &mut Report) -> Result<Cleaned> {
     }
     if cut > 0 {
         report.warn(format!(
-            "{}: {cut} faces that are not planar were cut into triangles (largest deviation {largest_deviation:.1e} of the diameter)",
+            "{}: {cut} faces that are not planar were cut into triangles (largest deviation {largest_deviation:.1e} of their side)",
             scene.path.display()
         ));
     }
@@ -156,6 +156,16 @@ fn refuse_crossing(
             ),
         )),
     }
+}
+
+/// How far a corner lies from the plane of the fan's triangle before it, at most, in parts of the polygon's side (the
+/// root of its area).
+fn fan_deviation(positions: &[DVec3]) -> f64 {
+    let off = |k: usize| {
+        let plane = Plane::of_polygon(&[positions[0], positions[k - 1], positions[k]]);
+        plane.map_or(0.0, |plane| plane.distance(positions[k + 1]).abs())
+    };
+    (2..positions.len() - 1).map(off).fold(0.0, f64::max) / polygon::area(positions).sqrt()
 }
 
 /// Triangles from the first corner.

@@ -290,7 +290,7 @@ mod tests {
 
     fn graph(segments: &[(f64, f64, f64, f64)]) -> PlanarGraph {
         let mut graph = PlanarGraph::default();
-        let mut point = |x: f64, y: f64, graph: &mut PlanarGraph| {
+        let point = |x: f64, y: f64, graph: &mut PlanarGraph| {
             graph.point(Point { uv: DVec2::new(x, y), position: DVec3::new(x, y, 0.0), place: None })
         };
         for (k, &(a, b, c, d)) in segments.iter().enumerate() {

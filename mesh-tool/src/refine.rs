@@ -140,11 +140,15 @@ impl Refinement {
                 continue;
             }
             let shape = self.shape(triangle);
+            // A strip thinner than this would need edges below the floor; halving its sides would be in vain.
+            let in_strip = shape.height < floor * SMALLEST_ANGLE.to_radians().sin()
+                && triangle.corners.iter().all(|&corner| !self.free[corner as usize]);
             if shape.longest > self.target.max_edge {
                 let change = self.middle(triangle, shape.longest_edge);
                 wishes.push((0.0, change, 0.5 * shape.longest));
             } else if shape.smallest_angle < SMALLEST_ANGLE.to_radians()
                 && !shape.given_angle
+                && !in_strip
                 && let Some((change, clearance)) = self.better_point(triangulation, t, floor)
             {
                 wishes.push((shape.smallest_angle, change, clearance));
@@ -179,12 +183,9 @@ impl Refinement {
         let [a, b, c] = triangulation.triangles[triangle].corners.map(|p| self.uv(p));
         let centre = circumcentre(a, b, c)?;
         let halve = |edge: u32| {
-            let Some(edge_length) =
-                self.graph.edges.get(edge as usize).map(|e| self.uv(e.from).distance(self.uv(e.to)))
-            else {
-                return None;
-            };
-            (edge_length >= 2.0 * floor).then_some((Change::Halve(edge), 0.5 * edge_length))
+            let ends = &self.graph.edges[edge as usize];
+            let length = self.uv(ends.from).distance(self.uv(ends.to));
+            (length >= 2.0 * floor).then_some((Change::Halve(edge), 0.5 * length))
         };
         // Walk towards the centre; an edge of the graph in the way is halved instead.
         let mut at = triangle;
@@ -283,6 +284,7 @@ impl Refinement {
         Shape {
             longest: lengths[longest_edge],
             longest_edge,
+            height: turn(corners[0], corners[1], corners[2]) / lengths[longest_edge],
             smallest_angle: angles[smallest],
             given_angle: triangle.constraints[smallest].is_some()
                 && triangle.constraints[(smallest + 2) % 3].is_some(),
@@ -294,6 +296,8 @@ impl Refinement {
 struct Shape {
     longest: f64,
     longest_edge: usize,
+    /// Height over the longest edge.
+    height: f64,
     smallest_angle: f64,
     /// Both edges at the smallest angle are edges of the graph: it cannot be widened.
     given_angle: bool,
