@@ -1,7 +1,9 @@
 //! `mesh-tool info`: what is in a mesh or a material table, on a page a person reads in ten seconds, or as JSON.
 
 use crate::build::Quality;
+use crate::sheets;
 use geometry::polygon;
+use glam::DVec3;
 use interchange::Result;
 use interchange::digest::Digest;
 use interchange::ids::GroupId;
@@ -73,14 +75,9 @@ fn emitter_count(mesh: &Mesh) -> usize {
 
 /// Lower and upper corner of the vertices.
 fn bounds(mesh: &Mesh) -> ([f64; 3], [f64; 3]) {
-    let mut bounds = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-    for vertex in &mesh.vertices {
-        for k in 0..3 {
-            bounds.0[k] = bounds.0[k].min(vertex[k]);
-            bounds.1[k] = bounds.1[k].max(vertex[k]);
-        }
-    }
-    bounds
+    let positions: Vec<DVec3> = mesh.vertices.iter().copied().map(DVec3::from_array).collect();
+    let (low, high) = sheets::bounds(&positions);
+    (low.to_array(), high.to_array())
 }
 
 fn origin_lines(page: &mut String, provenance: &Provenance, digest: Digest) {

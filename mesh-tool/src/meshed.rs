@@ -113,7 +113,7 @@ impl Drawing {
                 continue;
             }
             let mut seams = vec![false; 3];
-            for k in 0..3 {
+            for (k, seam) in seams.iter_mut().enumerate() {
                 let Some(edge) = triangle.constraints[k].map(|edge| &graph.edges[edge as usize]) else {
                     continue;
                 };
@@ -121,7 +121,7 @@ impl Drawing {
                 // A line along the outer border separates nothing.
                 let beyond = triangle.neighbours[k].and_then(|n| winners[n as usize]);
                 if let (Some(first), Some(beyond)) = (sources.next(), beyond) {
-                    seams[k] = true;
+                    *seam = true;
                     let [from, to] = [triangle.corners[k], triangle.corners[(k + 1) % 3]];
                     // One line where both sides belong to one sheet, else one on each.
                     if beyond != sheet || from < to {

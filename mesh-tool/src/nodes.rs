@@ -22,6 +22,9 @@ pub struct Element {
     pub surface: (u32, u32),
 }
 
+/// Surface and ends of an edge, the smaller one first.
+type SurfaceEdge = ((u32, u32), u32, u32);
+
 /// Nodes of some elements.
 #[derive(Debug, Default)]
 pub struct Nodes {
@@ -50,7 +53,7 @@ pub fn number(elements: &[Element], middles: Option<&[Vec<u32>]>) -> Nodes {
     };
 
     // Join the corners, and the middles, of elements that share an edge.
-    let mut edges: HashMap<((u32, u32), u32, u32), (usize, usize)> = HashMap::new();
+    let mut edges: HashMap<SurfaceEdge, (usize, usize)> = HashMap::new();
     for (e, element) in elements.iter().enumerate() {
         let n = element.corners.len();
         for k in (0..n).filter(|&k| !element.seams[k]) {
