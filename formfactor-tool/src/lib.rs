@@ -1,1 +1,4 @@
 //! Elements to exchange matrix.
+
+pub mod export;
+pub mod info;
