@@ -1,9 +1,14 @@
 //! The scene as its author wrote it: OBJ geometry, MTL materials, and the optional toml beside them.
 
+mod camera_check;
+mod current;
+mod material_files;
 mod mtl;
 mod obj;
 mod obj_scan;
+mod polygons;
 mod settings;
+mod statement;
 
 pub use settings::{CameraSettings, Settings};
 
@@ -25,7 +30,7 @@ pub struct SceneFace {
     pub group: GroupId,
     /// Material.
     pub material: MaterialId,
-    /// Line of the OBJ it stands on, from 1.
+    /// Line of the OBJ it begins on, from 1.
     pub line: usize,
 }
 
@@ -38,11 +43,11 @@ pub struct Scene {
     pub digest: Digest,
     /// MTL files it names, in order.
     pub material_files: Vec<PathBuf>,
-    /// Vertex positions.
+    /// Vertex positions, in file order; those no face names are left out.
     pub vertices: Vec<[f64; 3]>,
     /// Faces in file order.
     pub faces: Vec<SceneFace>,
-    /// Group names in order of first appearance.
+    /// Group names in order of their first face.
     pub groups: Vec<String>,
     /// Materials that faces use, in order of first use; two-sided ones marked.
     pub materials: MaterialTable,
@@ -57,5 +62,12 @@ impl Scene {
     /// Materials named in `two_sided` are two-sided besides those the toml lists.
     pub fn read(path: &Path, two_sided: &[String]) -> Result<Scene> {
         obj::read(path, two_sided)
+    }
+    /// The files it was read from, in a fixed order: the OBJ, its MTL files, and the toml if there is one.
+    /// Whatever is made from the scene depends on them (a line of a Makefile, say).
+    pub fn dependencies(&self) -> Vec<PathBuf> {
+        let toml = Some(self.path.with_extension("toml")).filter(|toml| toml.is_file());
+        let obj = std::iter::once(self.path.clone());
+        obj.chain(self.material_files.iter().cloned()).chain(toml).collect()
     }
 }
