@@ -13,7 +13,7 @@ mod statement;
 pub use settings::{CameraSettings, Settings};
 
 use crate::digest::Digest;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::ids::{GroupId, MaterialId};
 use crate::materials::MaterialTable;
 use std::path::{Path, PathBuf};
@@ -63,6 +63,7 @@ impl Scene {
     pub fn read(path: &Path, two_sided: &[String]) -> Result<Scene> {
         obj::read(path, two_sided)
     }
+
     /// The files it was read from, in a fixed order: the OBJ, its MTL files, and the toml if there is one.
     /// Whatever is made from the scene depends on them (a line of a Makefile, say).
     pub fn dependencies(&self) -> Vec<PathBuf> {
@@ -70,4 +71,16 @@ impl Scene {
         let obj = std::iter::once(self.path.clone());
         obj.chain(self.material_files.iter().cloned()).chain(toml).collect()
     }
+}
+
+/// All materials of one MTL file in order of definition, the file's identity, and what its author should look at.
+/// Which of them are two-sided an MTL file does not say.
+pub fn read_materials(path: &Path) -> Result<(MaterialTable, Digest, Vec<String>)> {
+    let mut library = mtl::Library::default();
+    library.read(path)?;
+    let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+    let mut entries: Vec<_> = library.entries.into_iter().collect();
+    entries.sort_by_key(|(_, entry)| entry.line);
+    let (names, values) = entries.into_iter().map(|(name, entry)| (name, entry.material)).unzip();
+    Ok((MaterialTable { names, values }, Digest::of(&bytes), library.warnings))
 }
