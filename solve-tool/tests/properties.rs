@@ -64,7 +64,7 @@ fn importance_bounds_what_the_norm_cannot() {
         assert_eq!(Amplification::from_norm(system.areas, &rho, &seen).proof, Proof::None);
         let found = Amplification::find(system, &rho, &seen);
         assert_eq!(found.proof, Proof::Importance);
-        // z = 1 + F rho z by hand: z3 = 8, z2 = 10 - ..., solved exactly below by iteration.
+        // The exact importance, by plain iteration of z = 1 + F (rho z).
         let mut z = [1.0; 4];
         for _ in 0..2000 {
             let fed: Vec<f64> = z.iter().zip(&rho).map(|(z, rho)| z * rho).collect();
@@ -156,8 +156,8 @@ fn channels_do_not_touch_each_other() {
     let three: [_; 3] = std::array::from_fn(|c| random_channel(300, [0.3, 0.99, 0.8][c], c as u64));
     for solver in [Solver::Cg, Solver::Direct] {
         let together = scene.solve(&three, solver, 1e-9).unwrap();
-        for c in 0..3 {
-            let alone = scene.solve(&std::array::from_fn(|_| three[c].clone()), solver, 1e-9).unwrap();
+        for (c, one) in three.iter().enumerate() {
+            let alone = scene.solve(&std::array::from_fn(|_| one.clone()), solver, 1e-9).unwrap();
             assert_eq!(alone.channels[0].radiosity, together.channels[c].radiosity, "channel {c}");
             assert_eq!(alone.channels[0].irradiance, together.channels[c].irradiance, "channel {c}");
         }

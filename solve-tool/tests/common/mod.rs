@@ -123,12 +123,11 @@ pub fn random(seed: u64) -> impl FnMut() -> f64 {
 pub fn random_scene(n: usize, most: f64, seed: u64) -> Scene {
     let mut next = random(seed);
     let mut s = vec![vec![0.0; n]; n];
-    for i in 0..n {
-        for j in i + 1..n {
-            let entry = if next() < 0.3 { 0.0 } else { next() };
-            s[i][j] = entry;
-            s[j][i] = entry;
-        }
+    let pairs = (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j)));
+    for (i, j) in pairs {
+        let entry = if next() < 0.3 { 0.0 } else { next() };
+        s[i][j] = entry;
+        s[j][i] = entry;
     }
     let areas: Vec<f64> =
         s.iter().map(|row| (row.iter().sum::<f64>() / most).max(1e-3) * (1.0 + next())).collect();
