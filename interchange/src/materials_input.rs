@@ -35,7 +35,9 @@ pub fn load_materials(
 fn read(path: &Path) -> Result<(MaterialTable, Digest)> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     if ending.as_deref() == Some("mtl") {
-        let (table, digest, warnings) = read_materials(path)?;
+        let (table, warnings) = read_materials(path)?;
+        let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+        let digest = Digest::of(&bytes);
         warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
         return Ok((table, digest));
     }

@@ -13,7 +13,7 @@ mod statement;
 pub use settings::{CameraSettings, Settings};
 
 use crate::digest::Digest;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::ids::{GroupId, MaterialId};
 use crate::materials::MaterialTable;
 use std::path::{Path, PathBuf};
@@ -57,9 +57,36 @@ pub struct Scene {
     pub warnings: Vec<String>,
 }
 
+/// The materials of one MTL file, in its order, and then [`NONE`]; none is two-sided, which the file cannot say.
+/// Beside it, what the author should look at. Errors name the line.
+pub fn read_materials(path: &Path) -> Result<(MaterialTable, Vec<String>)> {
+    let mut library = mtl::Library::default();
+    library.read(path)?;
+    let warnings = std::mem::take(&mut library.warnings);
+    Ok((library.into_table(), warnings))
+}
+
 impl Scene {
     /// Reads `path` (OBJ), the MTL files it names and `NAME.toml` beside it where that exists.
     /// Materials named in `two_sided` are two-sided besides those the toml lists.
+    ///
+    /// # Errors
+    /// Each names file and line: text that is not UTF-8; coordinates that are not finite or beyond 2^250; indices
+    /// that name no vertex; faces of fewer than 3 corners; unknown materials and missing MTL files; material values
+    /// out of range; settings that are unknown or make no picture. So does a scene without faces.
+    ///
+    /// # Limitations
+    /// Polygons only: points, lines and free-form surfaces are passed over, textures and vertex colours ignored.
+    ///
+    /// ```
+    /// # let folder = tempfile::tempdir()?;
+    /// let path = folder.path().join("square.obj");
+    /// std::fs::write(&path, "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\ng floor\nf 1 2 3 4\n")?;
+    /// let scene = interchange::scene::Scene::read(&path, &[])?;
+    /// assert_eq!(scene.faces[0].corners, [0, 1, 2, 3]);
+    /// assert_eq!((scene.groups[0].as_str(), scene.materials.names[0].as_str()), ("floor", "(none)"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn read(path: &Path, two_sided: &[String]) -> Result<Scene> {
         obj::read(path, two_sided)
     }
@@ -71,16 +98,4 @@ impl Scene {
         let obj = std::iter::once(self.path.clone());
         obj.chain(self.material_files.iter().cloned()).chain(toml).collect()
     }
-}
-
-/// All materials of one MTL file in order of definition, the file's identity, and what its author should look at.
-/// Which of them are two-sided an MTL file does not say.
-pub fn read_materials(path: &Path) -> Result<(MaterialTable, Digest, Vec<String>)> {
-    let mut library = mtl::Library::default();
-    library.read(path)?;
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
-    let mut entries: Vec<_> = library.entries.into_iter().collect();
-    entries.sort_by_key(|(_, entry)| entry.line);
-    let (names, values) = entries.into_iter().map(|(name, entry)| (name, entry.material)).unzip();
-    Ok((MaterialTable { names, values }, Digest::of(&bytes), library.warnings))
 }

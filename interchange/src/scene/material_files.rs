@@ -22,8 +22,10 @@ pub(super) fn locate(path: &Path, libraries: &[(String, usize)]) -> Result<Vec<P
 fn named(path: &Path, rest: &str, line: usize) -> Result<Vec<PathBuf>> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let whole = folder.join(rest);
-    if whole.is_file() {
-        return Ok(vec![whole]);
+    // Exporters on Windows write `.\walls.mtl`.
+    let slashed = folder.join(rest.replace('\\', "/"));
+    if let Some(file) = [&whole, &slashed].into_iter().find(|file| file.is_file()) {
+        return Ok(vec![file.clone()]);
     }
     let words = rest.split_whitespace().take_while(|word| !word.starts_with('#'));
     let split: Vec<PathBuf> = words.map(|word| folder.join(word)).collect();
@@ -67,6 +69,13 @@ mod tests {
     fn a_name_with_spaces_is_one_file_where_it_exists() {
         let folder = folder(&["my scene.mtl", "scene.mtl"]);
         assert_eq!(names(folder.path(), &["my scene.mtl"]).unwrap(), ["my scene.mtl"]);
+    }
+
+    #[test]
+    fn backslashes_of_windows_separate_folders() {
+        let folder = folder(&["walls.mtl"]);
+        let files = locate(&folder.path().join("s.obj"), &[(".\\walls.mtl".to_owned(), 1)]).unwrap();
+        assert_eq!(files, [folder.path().join("./walls.mtl")]);
     }
 
     #[test]

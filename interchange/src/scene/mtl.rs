@@ -4,7 +4,7 @@
 use super::NONE;
 use super::statement::{Statement, UnknownKeywords, decode, shown, statements};
 use crate::error::{Error, Result};
-use crate::materials::Material;
+use crate::materials::{Material, MaterialTable};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -44,6 +44,16 @@ impl Library {
     pub fn read(&mut self, path: &Path) -> Result<()> {
         let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
         self.add(path, decode(path, &bytes)?)
+    }
+
+    /// The materials as a table, in the order of their definitions in a single file, then the built-in one.
+    pub fn into_table(self) -> MaterialTable {
+        let mut entries: Vec<(String, Entry)> = self.entries.into_iter().collect();
+        entries.sort_by_key(|(_, entry)| entry.line);
+        let built_in = (NONE.to_owned(), Material::default());
+        let all = entries.into_iter().map(|(name, entry)| (name, entry.material)).chain([built_in]);
+        let (names, values) = all.unzip();
+        MaterialTable { names, values }
     }
 
     /// Adds the materials of `text`, the contents of `path`.
@@ -299,6 +309,13 @@ mod tests {
         let expected = "m.mtl:5: material a is defined differently at m.mtl:1; the later definition holds";
         assert_eq!(twice.warnings, [expected]);
         assert_eq!(library("newmtl a\nKd 0.1\nnewmtl a\nKd 0.1").unwrap().warnings, [""; 0]);
+    }
+
+    #[test]
+    fn a_table_has_the_materials_in_the_order_of_the_file() {
+        let table = library("newmtl z\nKd 0.1\nnewmtl a\nnewmtl m\nKd 0.3").unwrap().into_table();
+        assert_eq!(table.names, ["z", "a", "m", NONE]);
+        assert_eq!(table.values.iter().map(|m| m.diffuse[0]).collect::<Vec<_>>(), [0.1, 0.0, 0.3, 0.0]);
     }
 
     #[test]

@@ -327,7 +327,7 @@ impl<'p> Scanner<'p> {
             let count = self.before_any_material;
             let line = self.scan.faces.first().map_or(1, |face| face.line);
             warnings.push(format!(
-                "{path}:{line}: {count} faces stand before any usemtl; they are black and dark (material {NONE})"
+                "{path}:{line}: faces before any usemtl ({count}) are black and dark: they get the material {NONE}"
             ));
         }
         warnings

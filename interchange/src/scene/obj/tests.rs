@@ -80,7 +80,7 @@ fn materials_are_those_used_in_order_of_first_use() {
     assert_eq!(scene.materials.values[1].radiance, [1.0, 2.0, 3.0]);
     assert_eq!(scene.faces.iter().map(|f| f.material.0).collect::<Vec<_>>(), [0, 1, 2, 1]);
     assert_eq!(scene.warnings.len(), 1, "{:?}", scene.warnings);
-    assert!(scene.warnings[0].contains("1 faces stand before any usemtl"), "{:?}", scene.warnings);
+    assert!(scene.warnings[0].contains("faces before any usemtl (1) are black"), "{:?}", scene.warnings);
 }
 
 #[test]

@@ -55,7 +55,7 @@ fn names_are_the_whole_trimmed_rest_and_groups_without_faces_are_not_listed() {
     assert_eq!(scan.groups, [NONE, "left  wall #2"]);
     assert_eq!(scan.faces.iter().map(|f| f.group).collect::<Vec<_>>(), [0, 1, 0]);
     assert_eq!(scan.materials, [NONE, "wet paint"]);
-    let expected = "s.obj:5: 1 faces stand before any usemtl; they are black and dark (material (none))";
+    let expected = "s.obj:5: faces before any usemtl (1) are black and dark: they get the material (none)";
     assert_eq!(scan.warnings, [expected]);
 }
 
