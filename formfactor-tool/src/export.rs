@@ -149,3 +149,33 @@ impl<'a> Factors<'a> {
         sums
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// However few rows are made at a time, the table is the same.
+    #[test]
+    fn bands_make_no_difference() {
+        let blocks = [
+            Block::new(BlockKind::Triangle, 0..2, 0..2, 0),
+            Block::new(BlockKind::Dense, 0..2, 3..5, 3),
+            Block::new(BlockKind::Triangle, 2..5, 2..5, 7),
+        ];
+        let values: Vec<f64> = (1..=13).map(f64::from).collect();
+        let keys = [2, 0, 1, 2, 0];
+        let table = |band: usize| -> Vec<(usize, Vec<f64>)> {
+            let values = Values::F64(&values);
+            let areas = vec![1.0, 2.0, 4.0, 0.0];
+            Factors { blocks: &blocks, values, keys: &keys, areas, count: 4, band }.rows().collect()
+        };
+        let whole = table(4);
+        // S between key 0 (elements 1 and 4) and itself: S_11 + 2 S_14 + S_44 = 3 + 2 * 7 + 13.
+        assert_eq!(whole[0].1[0], 30.0);
+        // Keys 1 (element 2) and 2 (elements 0 and 3): S_23 = 8, and S_02 is absent.
+        assert_eq!((whole[1].1[2], whole[2].1[1]), (8.0 / 2.0, 8.0 / 4.0));
+        assert_eq!(whole[3].1, [0.0; 4]);
+        assert_eq!(table(1), whole);
+        assert_eq!(table(3), whole);
+    }
+}
