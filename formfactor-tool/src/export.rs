@@ -172,8 +172,8 @@ mod tests {
         let whole = table(4);
         // S between key 0 (elements 1 and 4) and itself: S_11 + 2 S_14 + S_44 = 3 + 2 * 7 + 13.
         assert_eq!(whole[0].1[0], 30.0);
-        // Keys 1 (element 2) and 2 (elements 0 and 3): S_23 = 8, and S_02 is absent.
-        assert_eq!((whole[1].1[2], whole[2].1[1]), (8.0 / 2.0, 8.0 / 4.0));
+        // Keys 1 (element 2) and 2 (elements 0 and 3): S_23 = 9, and S_02 is absent.
+        assert_eq!((whole[1].1[2], whole[2].1[1]), (9.0 / 2.0, 9.0 / 4.0));
         assert_eq!(whole[3].1, [0.0; 4]);
         assert_eq!(table(1), whole);
         assert_eq!(table(3), whole);
