@@ -5,5 +5,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod gather;
 pub mod plane;
 pub mod polygon;
+pub mod ray_cast;
