@@ -1,1 +1,54 @@
-fn main() {}
+//! Command line of the form-factor stage.
+
+use clap::{Parser, Subcommand, ValueEnum};
+use formfactor_tool::compute;
+use interchange::tool::{Common, Finish, exit_code};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Exchange matrix S = diag(A) F of a mesh, occlusion included
+#[derive(Debug, Parser)]
+#[command(name = "formfactor-tool", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Compute the matrix of a mesh
+    Compute {
+        /// Mesh made by mesh-tool build
+        mesh: PathBuf,
+        /// Matrix file to write
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
+        /// Bound on the estimated sum over j of |error of F_ij| in any row
+        #[arg(long, default_value = "1e-4", value_parser = compute::parse_tolerance)]
+        tolerance: f64,
+        /// Method: auto takes the cheapest exact or adaptive rule per pair
+        #[arg(long, value_enum, default_value = "auto")]
+        method: Method,
+    },
+}
+
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Method {
+    Auto,
+}
+
+fn run(cli: Cli) -> anyhow::Result<Finish> {
+    match cli.command {
+        Command::Compute { mesh, output, tolerance, method: Method::Auto } => {
+            compute::run(&compute::Request { mesh, output, tolerance }, &cli.common)
+        }
+    }
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    cli.common.start();
+    exit_code("formfactor-tool", run(cli))
+}

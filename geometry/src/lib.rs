@@ -5,7 +5,20 @@
 
 #![forbid(unsafe_code)]
 
+pub mod area_rule;
+pub mod contour;
+pub mod edge_pair;
 pub mod gather;
+pub mod occluded;
+pub mod occluder;
+pub mod pair;
+pub mod patch;
 pub mod plane;
+pub mod point_factor;
 pub mod polygon;
+pub mod quadrature;
 pub mod ray_cast;
+pub mod shadow_planes;
+pub mod sides;
+pub mod unoccluded;
+pub mod visible;

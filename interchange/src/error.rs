@@ -116,7 +116,7 @@ impl Error {
 }
 
 /// The file in the same folder whose name is closest to the missing one, if any is close.
-fn nearest_file(path: &Path) -> Option<PathBuf> {
+pub(crate) fn nearest_file(path: &Path) -> Option<PathBuf> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let wanted = path.file_name()?.to_string_lossy().into_owned();
     let mut names: Vec<String> = std::fs::read_dir(folder)

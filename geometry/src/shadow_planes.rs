@@ -1,0 +1,120 @@
+//! Planes in which a receiver's view of a source changes its kind: through a source corner and a blocker edge, or a
+//! blocker corner and a source edge (VE and EV events: Heckbert 92; Lischinski, Tampieri & Greenberg 92).
+//!
+//! Between these planes the visible part of the source depends smoothly on the receiver point, so quadrature on cells
+//! that do not cross them converges fast. Events of three skew edges (EEE) of different blockers are left to adaptivity.
+
+use crate::occluder::Occluder;
+use crate::polygon;
+use glam::DVec3;
+
+/// A plane g(x) = normal . (x - apex) = 0 with the triangle that makes it.
+#[derive(Debug, Clone, Copy)]
+pub struct ShadowPlane {
+    apex: DVec3,
+    from: DVec3,
+    to: DVec3,
+    normal: DVec3,
+    kind: Kind,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// Source corner, blocker edge: the edge must lie between the corner and the receiver.
+    SourceCorner,
+    /// Blocker corner, source edge: the corner must lie between the edge and the receiver.
+    BlockerCorner,
+    /// The blocker's own plane, where its two sides change roles.
+    BlockerPlane,
+}
+
+/// All shadow planes of a source and its blockers.
+pub fn shadow_planes(source: &[DVec3], blockers: &[&Occluder]) -> Vec<ShadowPlane> {
+    let mut planes = Vec::new();
+    let mut push = |apex: DVec3, from: DVec3, to: DVec3, kind: Kind| {
+        let normal = (from - apex).cross(to - apex).normalize_or_zero();
+        if normal != DVec3::ZERO {
+            planes.push(ShadowPlane { apex, from, to, normal, kind });
+        }
+    };
+    for blocker in blockers {
+        for (from, to) in polygon::edges(&blocker.corners) {
+            source.iter().for_each(|&corner| push(corner, from, to, Kind::SourceCorner));
+        }
+        for &corner in &blocker.corners {
+            polygon::edges(source).for_each(|(from, to)| push(corner, from, to, Kind::BlockerCorner));
+        }
+        if let [a, b, c, ..] = blocker.corners[..] {
+            push(a, b, c, Kind::BlockerPlane);
+        }
+    }
+    planes
+}
+
+impl ShadowPlane {
+    /// Signed distance from the plane.
+    pub fn height(&self, point: DVec3) -> f64 {
+        self.normal.dot(point - self.apex)
+    }
+
+    /// The shares in which the plane cuts the polygon's corners' heights (the smaller one, 0 to 1/2), where it cuts it
+    /// by more than `tolerance` (a length) on both sides and the event can be seen from the cut; `None` elsewhere.
+    pub fn cut_balance(&self, cell: &[DVec3], tolerance: f64) -> Option<f64> {
+        let (low, high) =
+            cell.iter().map(|&c| self.height(c)).fold((0.0f64, 0.0f64), |(l, h), x| (l.min(x), h.max(x)));
+        if -low <= tolerance || high <= tolerance {
+            return None;
+        }
+        self.is_seen_from_cut(cell).then(|| (-low).min(high) / (high - low))
+    }
+
+    /// Whether some point of the plane within the cell sees the blocker's edge (or corner) in line with the source's
+    /// corner (or edge). Errs on the side of yes.
+    fn is_seen_from_cut(&self, cell: &[DVec3]) -> bool {
+        if self.kind == Kind::BlockerPlane {
+            return true;
+        }
+        let mut places = [Place::default(); 2];
+        let mut count = 0;
+        for (a, b) in polygon::edges(cell) {
+            let (height_a, height_b) = (self.height(a), self.height(b));
+            if (height_a > 0.0) != (height_b > 0.0) && count < 2 {
+                places[count] = self.place(a + (b - a) * (height_a / (height_a - height_b)));
+                count += 1;
+            }
+        }
+        if count < 2 {
+            return true;
+        }
+        let [a, b] = places;
+        // A denominator that changes sign passes through infinity in between: anything may happen there.
+        if (a.denominator > 0.0) != (b.denominator > 0.0) || a.denominator == 0.0 || b.denominator == 0.0 {
+            return true;
+        }
+        let missed = |value: fn(&Place) -> f64| value(&a) < 0.0 && value(&b) < 0.0;
+        !(missed(|p| p.along) || missed(|p| 1.0 - p.along) || missed(|p| p.between))
+    }
+
+    /// Where the line from `point` through the apex meets the edge's line.
+    fn place(&self, point: DVec3) -> Place {
+        let (to_point, to_edge, edge) = (point - self.apex, self.from - self.apex, self.to - self.from);
+        let denominator = edge.cross(to_point).dot(self.normal);
+        let along = -to_edge.cross(to_point).dot(self.normal) / denominator;
+        // The edge's point is apex + share (point - apex).
+        let share = (to_edge + along * edge).dot(to_point) / to_point.length_squared();
+        let between = match self.kind {
+            Kind::SourceCorner => share.min(1.0 - share),
+            _ => -share,
+        };
+        Place { denominator, along, between }
+    }
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Place {
+    denominator: f64,
+    /// 0 to 1 on the edge.
+    along: f64,
+    /// Above 0 where apex, edge and point stand in the order that makes an event.
+    between: f64,
+}
