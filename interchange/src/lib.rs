@@ -15,6 +15,7 @@ pub mod error;
 pub mod ids;
 mod mapping;
 pub mod materials;
+pub mod materials_input;
 pub mod matrix;
 pub mod mesh;
 pub mod provenance;

@@ -19,19 +19,6 @@ pub enum Error {
         /// What to do.
         remedy: String,
     },
-    /// The mesh uses materials that the table does not have.
-    #[error(
-        "{}: no material {}, which {} uses; give a table of the scene the mesh was built from",
-        table.display(), missing.join(", "), mesh.display()
-    )]
-    MissingMaterials {
-        /// The table.
-        table: PathBuf,
-        /// The mesh.
-        mesh: PathBuf,
-        /// Names of the missing materials.
-        missing: Vec<String>,
-    },
     /// An EXR file that the decoder refuses.
     #[error("{}: not a readable OpenEXR file: {found}; remake it with shade-tool render", path.display())]
     Picture {

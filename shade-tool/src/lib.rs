@@ -19,7 +19,6 @@ pub mod face_elements;
 pub mod info;
 pub mod interpolation;
 pub mod lit_scene;
-pub mod materials;
 pub mod nodes;
 pub mod on_surface;
 pub mod picture;

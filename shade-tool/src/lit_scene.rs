@@ -1,11 +1,11 @@
 //! Mesh, solution and materials read together and checked against each other.
 
 use crate::error::Result;
-use crate::materials::{load_materials, matched_to_mesh};
 use glam::DVec3;
 use interchange::digest::Digest;
 use interchange::ids::{ElementId, FaceId};
 use interchange::materials::Material;
+use interchange::materials_input::{load_materials, table_beside};
 use interchange::mesh::Mesh;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
@@ -44,17 +44,17 @@ impl LitScene {
             let remedy = "run formfactor-tool compute and solve-tool solve on this mesh".into();
             return Err(interchange::Error::Mismatch { first, second, detail, remedy }.into());
         }
-        let loaded = load_materials(mesh_path, materials_path)?;
-        let materials = matched_to_mesh(mesh_path, &mesh, &loaded)?;
-        if loaded.digest != origins.materials {
+        let (materials, materials_digest) = load_materials(mesh_path, materials_path, &mesh.materials)?;
+        if materials_digest != origins.materials {
             report.warn(format!(
                 "{}: not the materials that {} was solved with: surfaces show these, the light that reaches them is the \
                  old one; run solve-tool solve",
-                loaded.path.display(),
+                materials_path.unwrap_or(&table_beside(mesh_path)).display(),
                 solution_path.display()
             ));
         }
-        let inputs = vec![("solution", solution_digest), ("mesh", mesh_digest), ("materials", loaded.digest)];
+        let inputs =
+            vec![("solution", solution_digest), ("mesh", mesh_digest), ("materials", materials_digest)];
         Ok(LitScene { mesh, radiosity: solution.radiosity, materials, inputs })
     }
 

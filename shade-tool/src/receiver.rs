@@ -41,12 +41,8 @@ impl<'a> Light<'a> {
     pub fn new(scene: &'a LitScene) -> Light<'a> {
         let mesh = &scene.mesh;
         let elements = mesh.element_ids().map(|element| mesh.element_corners(element)).collect();
-        let gatherer = Gatherer::new(
-            scene.pieces(),
-            mesh.occluder_faces.iter().map(|face| face.0).collect(),
-            elements,
-            mesh.element_faces.iter().map(|face| face.0).collect(),
-        );
+        let gatherer =
+            Gatherer::new(scene.pieces(), mesh.occluder_faces.iter().map(|face| face.0).collect(), elements);
         Light { gatherer, radiosity: &scene.radiosity }
     }
 
