@@ -1,7 +1,7 @@
 //! Radiosity to pictures and points: the last stage of the pipeline.
 //!
 //! [`render`] finds the surface that each sample of a pixel sees ([`visible`]), gathers irradiance at the nodes of the
-//! elements that are seen ([`nodes`]), interpolates radiosity linearly between them ([`interpolation`]) and writes
+//! elements that are seen ([`nodes`], [`node_places`]), interpolates radiosity linearly between them ([`interpolation`]) and writes
 //! radiance as OpenEXR ([`exr_file`]) and a tone-mapped preview ([`preview`]). [`probe`] gathers irradiance at the
 //! points of a table. [`info`] tells what a picture holds.
 //!
@@ -13,12 +13,14 @@
 
 pub mod camera;
 pub mod command_line;
+pub mod convex;
 pub mod error;
 pub mod exr_file;
 pub mod face_elements;
 pub mod info;
 pub mod interpolation;
 pub mod lit_scene;
+pub mod node_places;
 pub mod nodes;
 pub mod on_surface;
 pub mod picture;

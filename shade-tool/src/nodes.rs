@@ -1,162 +1,188 @@
 //! Radiosity at the nodes that a picture needs: B = E + rho H, with H gathered exactly at the node instead of
-//! averaged from the elements around it.
+//! averaged from the elements around it; and the linear interpolation between them.
 
 use crate::lit_scene::LitScene;
-use crate::receiver::{INWARD, Light, Receiver, limit_from_inside};
+use crate::node_places::{NodePlace, NodePlaces, corner_nodes};
+use crate::receiver::{Light, Receiver};
 use geometry::gather::Scratch;
-use geometry::polygon;
-use glam::DVec3;
 use interchange::ids::{ElementId, NodeId, VertexId};
-use interchange::ragged::Ragged;
 use rayon::prelude::*;
+use std::collections::HashMap;
 
-/// Elements surround a node when what is left of the sum of their sectors' unit vectors is below this: rounding leaves
-/// 1e-15, and a sector of 359 degrees 2 sin(179.5 degrees) = 0.017.
-const SURROUNDED: f64 = 1e-6;
+/// What is known of a node.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum State {
+    Unknown,
+    Whole([f64; 3]),
+    /// One value per edge of its elements.
+    Split,
+}
+
+/// An edge of an element, seen from the node at its start.
+type NodeEdge = (NodeId, VertexId);
 
 /// Radiosity of the nodes gathered so far.
 #[derive(Debug)]
 pub struct NodeRadiosity<'a> {
     scene: &'a LitScene,
     light: Light<'a>,
-    /// Elements that have the node as a corner.
-    elements: Ragged<u32>,
-    radiosity: Vec<Option<[f64; 3]>>,
-    /// Nodes gathered.
-    pub gathered: usize,
-    /// Nodes whose material reflects nothing, so that B = E without gathering.
+    places: NodePlaces<'a>,
+    states: Vec<State>,
+    /// Values of split nodes. Only looked up, never listed: its order is nobody's.
+    on_edges: HashMap<NodeEdge, [f64; 3]>,
+    /// What was done.
+    pub counts: Counts,
+}
+
+/// How many nodes were treated how.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Gathered once.
+    pub whole: usize,
+    /// With a value per edge, because their limit depends on direction.
+    pub split: usize,
+    /// Edges gathered for split nodes.
+    pub edges: usize,
+    /// Not gathered, because their material reflects nothing: B = E.
     pub black: usize,
+    /// Not gathered, because nothing needed them.
+    pub unseen: usize,
 }
 
 impl<'a> NodeRadiosity<'a> {
     /// No node gathered yet.
     pub fn new(scene: &'a LitScene) -> NodeRadiosity<'a> {
+        let nodes = scene.mesh.node_vertices.len();
         NodeRadiosity {
             scene,
             light: Light::new(scene),
-            elements: elements_of_nodes(scene),
-            radiosity: vec![None; scene.mesh.node_vertices.len()],
-            gathered: 0,
-            black: 0,
+            places: NodePlaces::new(scene),
+            states: vec![State::Unknown; nodes],
+            on_edges: HashMap::new(),
+            counts: Counts { unseen: nodes, ..Counts::default() },
         }
     }
 
-    /// Corner nodes of an element, in the order of its corners.
-    pub fn of_element(&self, element: ElementId) -> &'a [NodeId] {
-        corner_nodes(self.scene, element)
-    }
-
-    /// Gathers those of the nodes that are not known yet; `done` is called after each.
-    pub fn gather(&mut self, wanted: &[NodeId], done: impl Fn() + Sync) {
+    /// Gathers those corner nodes of the elements that are not known yet. `begin` is told how many points that
+    /// takes, `done` is called after each.
+    pub fn gather(&mut self, elements: &[ElementId], begin: impl FnOnce(usize), done: impl Fn() + Sync) {
+        // Find out which nodes are whole, split or black.
         let mut missing: Vec<NodeId> =
-            wanted.iter().copied().filter(|node| self.radiosity[node.index()].is_none()).collect();
+            elements.iter().flat_map(|&element| corner_nodes(self.scene, element)).copied().collect();
+        missing.retain(|node| self.states[node.index()] == State::Unknown);
         missing.sort_unstable();
         missing.dedup();
-        let (scene, light, elements) = (self.scene, &self.light, &self.elements);
-        let values: Vec<([f64; 3], bool)> = missing
+        let places: Vec<Option<NodePlace>> =
+            missing.par_iter().map(|&node| self.places.of_node(node)).collect();
+        let mut whole: Vec<(NodeId, ElementId, Receiver)> = Vec::new();
+        for (&node, place) in missing.iter().zip(&places) {
+            self.counts.unseen -= 1;
+            let reflecting = place.filter(|p| self.scene.material(p.element).diffuse != [0.0; 3]);
+            match (place, reflecting) {
+                (_, Some(place)) if place.split => self.states[node.index()] = State::Split,
+                (_, Some(place)) => whole.push((node, place.element, place.receiver)),
+                (place, None) => {
+                    let exitance = place.map(|p| self.scene.material(p.element).exitance());
+                    self.states[node.index()] = State::Whole(exitance.unwrap_or_default());
+                    self.counts.black += 1;
+                }
+            }
+        }
+        let split = missing.iter().filter(|node| self.states[node.index()] == State::Split).count();
+        let edges = self.missing_edges(elements);
+
+        // Gather.
+        begin(whole.len() + edges.len());
+        let (scene, light) = (self.scene, &self.light);
+        let gathered = |scratch: &mut Scratch, element: ElementId, receiver: &Receiver| {
+            let (material, irradiance) = (scene.material(element), light.irradiance(receiver, scratch));
+            let exitance = material.exitance();
+            done();
+            std::array::from_fn(|c| exitance[c] + material.diffuse[c] * irradiance[c])
+        };
+        let at_nodes: Vec<[f64; 3]> = whole
             .par_iter()
-            .map_init(Scratch::default, |scratch, &node| {
-                let value = node_radiosity(scene, light, elements.row(node.index()), node, scratch);
-                done();
-                value
+            .map_init(Scratch::default, |scratch, (_, element, receiver)| {
+                gathered(scratch, *element, receiver)
             })
             .collect();
-        for (node, (radiosity, was_gathered)) in missing.iter().zip(values) {
-            self.radiosity[node.index()] = Some(radiosity);
-            *(if was_gathered { &mut self.gathered } else { &mut self.black }) += 1;
+        let at_edges: Vec<[f64; 3]> = edges
+            .par_iter()
+            .map_init(Scratch::default, |scratch, (_, element, receiver)| {
+                gathered(scratch, *element, receiver)
+            })
+            .collect();
+
+        // Keep.
+        for ((node, ..), radiosity) in whole.iter().zip(at_nodes) {
+            self.states[node.index()] = State::Whole(radiosity);
         }
+        self.on_edges.extend(edges.iter().map(|(edge, ..)| *edge).zip(at_edges));
+        self.counts.whole += whole.len();
+        self.counts.split += split;
+        self.counts.edges += edges.len();
     }
 
-    /// Radiosity of a node, RGB, W m^-2; zero where it was not gathered.
-    pub fn value(&self, node: NodeId) -> [f64; 3] {
-        debug_assert!(self.radiosity[node.index()].is_some(), "node {node:?} was not gathered");
-        self.radiosity[node.index()].unwrap_or_default()
-    }
-
-    /// Number of nodes that nothing needed.
-    pub fn skipped(&self) -> usize {
-        self.radiosity.len() - self.gathered - self.black
-    }
-}
-
-fn corner_nodes(scene: &LitScene, element: ElementId) -> &[NodeId] {
-    let corners = scene.mesh.elements.row(element.index()).len();
-    &scene.mesh.element_nodes.row(element.index())[..corners]
-}
-
-/// For each node the elements that have it as a corner, lowest first.
-fn elements_of_nodes(scene: &LitScene) -> Ragged<u32> {
-    let mut rows = vec![Vec::new(); scene.mesh.node_vertices.len()];
-    for element in scene.mesh.element_ids() {
-        for node in corner_nodes(scene, element) {
-            rows[node.index()].push(element.0);
+    /// Edges at split nodes whose value is not known yet. Two elements that share one would get the same; the lower one
+    /// is asked.
+    fn missing_edges(&self, elements: &[ElementId]) -> Vec<(NodeEdge, ElementId, Receiver)> {
+        let mut edges = Vec::new();
+        for &element in elements {
+            let (nodes, corners) = self.corners(element);
+            for (k, &node) in nodes.iter().enumerate() {
+                if self.states[node.index()] == State::Split {
+                    let [before, after] = beside(k, nodes.len());
+                    edges.extend([before, after].map(|end| ((node, corners[end]), element, k, end)));
+                }
+            }
         }
+        edges.retain(|(edge, ..)| !self.on_edges.contains_key(edge));
+        edges.sort_unstable();
+        edges.dedup_by_key(|(edge, ..)| *edge);
+        let receiver =
+            |(edge, element, corner, end)| (edge, element, self.places.on_edge(element, corner, end));
+        edges.into_iter().map(receiver).collect()
     }
-    rows.into_iter().collect()
-}
 
-/// Radiosity of a node, and whether light had to be gathered for it.
-fn node_radiosity(
-    scene: &LitScene,
-    light: &Light,
-    elements: &[u32],
-    node: NodeId,
-    scratch: &mut Scratch,
-) -> ([f64; 3], bool) {
-    let Some((element, receiver)) = node_receiver(scene, elements, node) else { return ([0.0; 3], false) };
-    let material = scene.material(element);
-    if material.diffuse == [0.0; 3] {
-        return (material.exitance(), false);
+    fn corners(&self, element: ElementId) -> (&'a [NodeId], &'a [VertexId]) {
+        (corner_nodes(self.scene, element), self.scene.mesh.elements.row(element.index()))
     }
-    let irradiance = light.irradiance(&receiver, scratch);
-    let exitance = material.exitance();
-    let radiosity = std::array::from_fn(|c| exitance[c] + material.diffuse[c] * irradiance[c]);
-    (radiosity, true)
-}
 
-/// Where a node receives: just inside its elements, for on a contact only the limit from there exists.
-///
-/// At a corner where walls meet, that limit depends on the direction of approach. The node stands for all of them, so it
-/// is approached along the middle of the sector that its elements fill. Where they surround it, any direction serves, and
-/// the largest element gives it: a thin one may be all within reach of rounding.
-fn node_receiver(scene: &LitScene, elements: &[u32], node: NodeId) -> Option<(ElementId, Receiver)> {
-    let place = scene.mesh.node_vertices[node.index()];
-    let vertex = scene.mesh.position(place);
-    let mut largest = (0.0, ElementId(0), DVec3::ZERO);
-    let (mut turn, mut nearest) = (DVec3::ZERO, f64::INFINITY);
-    for element in elements.iter().map(|&element| ElementId(element)) {
-        let corners = scene.mesh.element_corners(element);
-        let (vector_area, centroid) = (polygon::vector_area(&corners), polygon::centroid(&corners));
-        if vector_area.length() > largest.0 {
-            largest = (vector_area.length(), element, centroid);
+    /// Radiosity within an element at the point where its corners weigh `weights`, RGB, W m^-2; its nodes must have been
+    /// gathered.
+    ///
+    /// The value of a split node is itself interpolated between those on the two edges of the element, as if the corner
+    /// were an edge of length zero; so elements agree along the edges they share, and within each the value turns with the
+    /// direction from the corner.
+    pub fn interpolate(&self, element: ElementId, weights: &[f64]) -> [f64; 3] {
+        let (nodes, corners) = self.corners(element);
+        let mut radiosity = [0.0; 3];
+        let mut add = |weight: f64, value: [f64; 3]| {
+            for (sum, b) in radiosity.iter_mut().zip(value) {
+                *sum += weight * b;
+            }
+        };
+        for (k, &node) in nodes.iter().enumerate() {
+            match self.states[node.index()] {
+                State::Whole(value) => add(weights[k], value),
+                State::Split => {
+                    let ends = beside(k, nodes.len());
+                    let [before, after] = ends.map(|end| weights[end]);
+                    let turned = if before + after > 0.0 { after / (before + after) } else { 0.5 };
+                    let [before, after] = ends.map(|end| self.on_edges.get(&(node, corners[end])).copied());
+                    add(weights[k] * (1.0 - turned), before.unwrap_or_default());
+                    add(weights[k] * turned, after.unwrap_or_default());
+                }
+                State::Unknown => debug_assert!(false, "node {node:?} was not gathered"),
+            }
         }
-        nearest = nearest.min(centroid.distance(vertex));
-        turn += turn_at(scene, element, place);
+        radiosity
     }
-    let (area, element, centroid) = largest;
-    if area <= 0.0 {
-        return None;
-    }
-    let normal = polygon::vector_area(&scene.mesh.element_corners(element)) / area;
-    // The integral of the unit vectors of a sector from a to b is (b - a) x n; sectors side by side telescope.
-    let middle = turn.cross(normal);
-    let along_middle = vertex + INWARD * nearest * middle.normalize_or_zero();
-    let is_within = |&element: &u32| {
-        let corners = scene.mesh.element_corners(ElementId(element));
-        polygon::edges(&corners).all(|(a, b)| (b - a).cross(along_middle - a).dot(normal) >= 0.0)
-    };
-    let open = middle.length() > SURROUNDED && elements.iter().any(is_within);
-    let point = if open { along_middle } else { limit_from_inside(vertex, centroid) };
-    Some((element, Receiver { point, normal, face: Some(scene.mesh.element_face(element).0) }))
 }
 
-/// Unit vector from the corner at `place` to the one before it, less that to the one after it.
-fn turn_at(scene: &LitScene, element: ElementId, place: VertexId) -> DVec3 {
-    let corners = scene.mesh.elements.row(element.index());
-    let Some(k) = corners.iter().position(|&corner| corner == place) else { return DVec3::ZERO };
-    let at = |k: usize| scene.mesh.position(corners[k % corners.len()]);
-    let towards = |k: usize| (at(k) - scene.mesh.position(place)).normalize_or_zero();
-    towards(k + corners.len() - 1) - towards(k + 1)
+/// Corners before and after corner `k` of `n`.
+fn beside(k: usize, n: usize) -> [usize; 2] {
+    [(k + n - 1) % n, (k + 1) % n]
 }
 
 #[cfg(test)]
@@ -173,49 +199,93 @@ mod tests {
         scene
     }
 
-    /// In a closed cube where all radiosity is 1, H = 1 at every node, corners included.
+    fn gathered(scene: &LitScene) -> NodeRadiosity<'_> {
+        let mut nodes = NodeRadiosity::new(scene);
+        let all: Vec<ElementId> = scene.mesh.element_ids().collect();
+        nodes.gather(&all, |_| {}, || {});
+        nodes
+    }
+
+    /// In a closed cube where all radiosity is 1, H = 1 at every node, corners included, and between them.
     #[test]
     fn furnace_has_unit_irradiance_at_every_node() {
         for n in [1, 3] {
             let scene = furnace(n);
-            let mut nodes = NodeRadiosity::new(&scene);
-            let all: Vec<NodeId> = (0..scene.mesh.node_vertices.len()).map(NodeId::new).collect();
-            nodes.gather(&all, || {});
-            for &node in &all {
-                let want = [0.5 + 0.5, 0.25 * 2.0, 3.0];
-                for (got, want) in nodes.value(node).iter().zip(want) {
-                    assert!((got - want).abs() < 1e-9, "node {node:?} of {n}: {got}, want {want}");
+            let nodes = gathered(&scene);
+            let corner = |k: usize| std::array::from_fn(|i| f64::from(u8::from(i == k)));
+            for element in scene.mesh.element_ids() {
+                for weights in [corner(0), corner(1), corner(2), corner(3), [0.4, 0.3, 0.2, 0.1]] {
+                    let want = [0.5 + 0.5, 0.25 * 2.0, 3.0];
+                    for (got, want) in nodes.interpolate(element, &weights).iter().zip(want) {
+                        assert!((got - want).abs() < 1e-9, "{element:?} of {n}: {got}, want {want}");
+                    }
                 }
             }
-            assert_eq!((nodes.gathered, nodes.black, nodes.skipped()), (all.len(), 0, 0));
+            let corners = 24;
+            let whole = scene.mesh.node_vertices.len() - corners;
+            let want = Counts { whole, split: corners, edges: 2 * corners, black: 0, unseen: 0 };
+            assert_eq!(nodes.counts, want);
         }
     }
 
-    /// In the corner of a box an adjoining wall fills 180 degrees of azimuth for a point approaching along the wall, 90 for
-    /// one along the other wall, and 135 for one along the diagonal: H = 3/8 of its radiosity.
+    /// The wall x = 0 lights the floor of a cube. At the ends of its foot a point that comes along the wall has it on 180
+    /// degrees of azimuth, and one that comes perpendicular to it on 90: 1/2 and 1/4 (theory 4.1 case 9).
     #[test]
-    fn corner_node_is_approached_along_the_diagonal() {
+    fn corner_of_a_room_depends_on_the_direction() {
         let mut scene = furnace(1);
-        let light =
-            (0..6).find(|&e| scene.mesh.element_corners(ElementId(e)).iter().all(|p| p.x == 0.0)).unwrap();
         scene.radiosity = vec![[0.0; 3]; 6];
-        scene.radiosity[light as usize] = [1.0; 3];
+        scene.radiosity[2] = [1.0; 3];
         scene.materials[0].diffuse = [1.0; 3];
         scene.materials[0].radiance = [0.0; 3];
-        let floor =
-            (0..6).find(|&e| scene.mesh.element_corners(ElementId(e)).iter().all(|p| p.y == 0.0)).unwrap();
         let mut nodes = NodeRadiosity::new(&scene);
-        let floor_nodes = nodes.of_element(ElementId(floor));
-        nodes.gather(floor_nodes, || {});
-        for &node in floor_nodes {
-            let x = scene.mesh.position(scene.mesh.node_vertices[node.index()]).x;
-            let got = nodes.value(node)[0];
-            // At the far corners the wall of the unit cube subtends (1/2 pi)(atan 1 - (1/sqrt 2) atan (1/sqrt 2)).
-            let far = (1f64.atan() - 0.5f64.sqrt() * 0.5f64.sqrt().atan()) / std::f64::consts::TAU;
-            let want = if x == 0.0 { 0.375 } else { far };
-            assert!((got - want).abs() < 1e-5, "x = {x}: {got}, want {want}");
+        let floor = ElementId(0);
+        nodes.gather(&[floor], |points| assert_eq!(points, 8), || {});
+        // Floor corners in x and z: (0, 0), (0, 1), (1, 1), (1, 0). The far ones see the wall of the unit cube with
+        // (1 / 2 pi)(atan 1 - (1 / sqrt 2) atan(1 / sqrt 2)).
+        let far = (1f64.atan() - 0.5f64.sqrt() * 0.5f64.sqrt().atan()) / std::f64::consts::TAU;
+        let tiny = 1e-12;
+        for (weights, want) in [
+            ([1.0 - tiny, tiny, 0.0, 0.0], 0.5),
+            ([1.0 - tiny, 0.0, 0.0, tiny], 0.25),
+            ([1.0 - tiny, tiny / 2.0, 0.0, tiny / 2.0], 0.375),
+            ([0.0, 1.0 - tiny, tiny, 0.0], 0.25),
+            ([0.0, 0.0, 1.0, 0.0], far),
+            ([0.0, 0.0, 0.0, 1.0], far),
+        ] {
+            let got = nodes.interpolate(floor, &weights)[0];
+            // The distance along the edge, 1e-4, with its logarithm.
+            assert!((got - want).abs() < 1e-3, "{weights:?}: {got}, want {want}");
         }
-        assert_eq!(nodes.skipped(), 20);
+        assert_eq!(nodes.counts, Counts { whole: 0, split: 4, edges: 8, black: 0, unseen: 20 });
+    }
+
+    /// The floor of a cube as two triangles, which share a diagonal between two corners of the room.
+    #[test]
+    fn elements_agree_along_an_edge_from_a_split_node() {
+        let mut mesh = cube(1).mesh;
+        let halves = [[0, 1, 2], [0, 2, 3]];
+        let corners: Vec<_> = mesh.elements.rows().map(<[VertexId]>::to_vec).collect();
+        let nodes: Vec<_> = mesh.element_nodes.rows().map(<[NodeId]>::to_vec).collect();
+        let corners =
+            halves.map(|half| half.map(|k| corners[0][k]).to_vec()).into_iter().chain(corners[1..].to_vec());
+        let nodes =
+            halves.map(|half| half.map(|k| nodes[0][k]).to_vec()).into_iter().chain(nodes[1..].to_vec());
+        (mesh.elements, mesh.element_nodes) = (corners.collect(), nodes.collect());
+        mesh.element_faces.insert(0, mesh.element_faces[0]);
+        mesh.element_sides.push(0);
+        let mut scene = crate::test_scenes::lit(mesh);
+        scene.radiosity = (0..7).map(|i| [f64::from(i), f64::from(i % 3), 0.0]).collect();
+        let nodes = gathered(&scene);
+        assert_eq!((nodes.counts.split, nodes.counts.edges), (24, 10 + 5 * 8));
+        for t in [1e-9, 0.25, 0.9] {
+            let first = nodes.interpolate(ElementId(0), &[1.0 - t, 0.0, t]);
+            let second = nodes.interpolate(ElementId(1), &[1.0 - t, t, 0.0]);
+            assert_eq!(first, second, "at {t} of the diagonal");
+        }
+        // Near the corner the diagonal is not what the edges beside it are.
+        let beside = nodes.interpolate(ElementId(0), &[1.0 - 1e-9, 1e-9, 0.0]);
+        let diagonal = nodes.interpolate(ElementId(0), &[1.0 - 1e-9, 0.0, 1e-9]);
+        assert!((beside[0] - diagonal[0]).abs() > 0.1, "{beside:?} and {diagonal:?}");
     }
 
     #[test]
@@ -223,8 +293,9 @@ mod tests {
         let mut scene = furnace(1);
         scene.materials[0].diffuse = [0.0; 3];
         let mut nodes = NodeRadiosity::new(&scene);
-        nodes.gather(&[NodeId(0), NodeId(3), NodeId(0)], || {});
-        assert_eq!((nodes.gathered, nodes.black, nodes.skipped()), (0, 2, 22));
-        assert_eq!(nodes.value(NodeId(3)), [0.5, 0.0, 0.0]);
+        nodes.gather(&[ElementId(3), ElementId(3)], |points| assert_eq!(points, 0), || {});
+        nodes.gather(&[ElementId(3)], |points| assert_eq!(points, 0), || {});
+        assert_eq!(nodes.counts, Counts { black: 4, unseen: 20, ..Counts::default() });
+        assert_eq!(nodes.interpolate(ElementId(3), &[0.25; 4]), [0.5, 0.0, 0.0]);
     }
 }

@@ -1,6 +1,7 @@
 //! Which face a probe point lies on. Points computed elsewhere carry about 7 digits, so they lie off their face by rounding,
 //! before or behind it, and on a border perhaps beyond it.
 
+use crate::convex::{depth, nearest_on_border};
 use crate::lit_scene::LitScene;
 use crate::receiver::{INWARD, Receiver, limit_from_inside};
 use geometry::plane::Plane;
@@ -95,25 +96,6 @@ impl Surfaces {
         let normal = if faces_along { plane.normal } else { -plane.normal };
         Some(Candidate { miss, on_border, receiver: Receiver { point, normal, face: Some(face.0) } })
     }
-}
-
-/// Least signed distance of a point of the plane from the lines of the edges: positive within the polygon.
-fn depth(corners: &[DVec3], normal: DVec3, point: DVec3) -> f64 {
-    let distance = |(a, b): (DVec3, DVec3)| normal.cross((b - a).normalize_or_zero()).dot(point - a);
-    polygon::edges(corners).map(distance).fold(f64::INFINITY, f64::min)
-}
-
-/// Point of the border nearest to `point`.
-fn nearest_on_border(corners: &[DVec3], point: DVec3) -> DVec3 {
-    let on_edge = |(a, b): (DVec3, DVec3)| {
-        let edge = b - a;
-        let along = (point - a).dot(edge) / edge.length_squared();
-        if along.is_finite() { a + along.clamp(0.0, 1.0) * edge } else { a }
-    };
-    let nearer = |a: DVec3, b: DVec3| {
-        if b.distance_squared(point) < a.distance_squared(point) { b } else { a }
-    };
-    polygon::edges(corners).map(on_edge).reduce(nearer).unwrap_or(point)
 }
 
 #[cfg(test)]

@@ -8,12 +8,11 @@ use crate::lit_scene::LitScene;
 use crate::nodes::NodeRadiosity;
 use crate::picture::Picture;
 use crate::visible::{Seen, VisibleSurface};
-use interchange::ids::{ElementId, NodeId};
+use interchange::ids::ElementId;
 use interchange::report::{Phase, Report};
 use interchange::tool::Common;
 use rayon::prelude::*;
 use std::f64::consts::FRAC_1_PI;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 /// The picture is made in bands of rows with about this many samples: 32 MB of what they see are kept at a time, and a
@@ -51,15 +50,8 @@ pub fn render(
 
         // Gather at the nodes of the elements that are seen.
         let start = Instant::now();
-        let wanted = nodes_of_seen(&nodes, scene.mesh.element_count(), &seen);
-        let gathered = AtomicUsize::new(0);
-        bar.inc_length(wanted.len() as u64);
-        nodes.gather(&wanted, || {
-            gathered.fetch_add(1, Ordering::Relaxed);
-            bar.inc(1);
-        });
-        // Nodes shared between elements or known from an earlier band.
-        bar.inc((wanted.len() - gathered.into_inner()) as u64);
+        let elements = seen_elements(scene.mesh.element_count(), &seen);
+        nodes.gather(&elements, |points| bar.inc_length(points as u64), || bar.inc(1));
         clock(1, start);
 
         // Interpolate, and average over each pixel.
@@ -75,9 +67,11 @@ pub fn render(
     bar.finish_and_clear();
     report.phases.extend(times.map(|(name, seconds)| Phase { name: name.into(), seconds }));
     report.count("samples", width * height * samples * samples);
-    report.count("nodes_gathered", nodes.gathered);
-    report.count("nodes_black_skipped", nodes.black);
-    report.count("nodes_unseen_skipped", nodes.skipped());
+    report.count("nodes_gathered", nodes.counts.whole);
+    report.count("nodes_split", nodes.counts.split);
+    report.count("node_edges_gathered", nodes.counts.edges);
+    report.count("nodes_black_skipped", nodes.counts.black);
+    report.count("nodes_unseen_skipped", nodes.counts.unseen);
     for (channel, mean) in ["r", "g", "b"].iter().zip(picture.mean()) {
         report.estimate(&format!("mean_radiance_{channel}"), mean);
     }
@@ -113,16 +107,15 @@ fn count_unlit(seen: &[Seen], report: &mut Report) {
     report.count("back_face_samples", seen.iter().filter(|s| **s == Seen::Back).count());
 }
 
-/// Corner nodes of all elements that are seen, each element once.
-fn nodes_of_seen(nodes: &NodeRadiosity, elements: usize, seen: &[Seen]) -> Vec<NodeId> {
+/// All elements that are seen, each once.
+fn seen_elements(elements: usize, seen: &[Seen]) -> Vec<ElementId> {
     let mut is_seen = vec![false; elements];
     for sample in seen {
         if let Seen::Surface(element, _) = sample {
             is_seen[element.index()] = true;
         }
     }
-    let seen = is_seen.iter().enumerate().filter(|(_, seen)| **seen);
-    seen.flat_map(|(element, _)| nodes.of_element(ElementId::new(element))).copied().collect()
+    (0..elements).filter(|&element| is_seen[element]).map(ElementId::new).collect()
 }
 
 /// Mean radiance B / pi over the samples of a pixel.
@@ -131,10 +124,8 @@ fn pixel(surface: &VisibleSurface, nodes: &NodeRadiosity, seen: &[Seen], weights
     for sample in seen {
         let Seen::Surface(element, place) = *sample else { continue };
         corner_weights(surface.corners(element), place, weights);
-        for (node, weight) in nodes.of_element(element).iter().zip(weights.iter()) {
-            for (sum, b) in sum.iter_mut().zip(nodes.value(*node)) {
-                *sum += weight * b;
-            }
+        for (sum, b) in sum.iter_mut().zip(nodes.interpolate(element, weights)) {
+            *sum += b;
         }
     }
     sum.map(|radiosity| radiosity * FRAC_1_PI / seen.len().max(1) as f64)
@@ -192,7 +183,7 @@ mod tests {
             }
             assert_eq!(report.counters["samples"], 16 * 12 * 9);
             assert_eq!(report.counters["background_samples"] + report.counters["back_face_samples"], 0);
-            let nodes = ["nodes_gathered", "nodes_black_skipped", "nodes_unseen_skipped"];
+            let nodes = ["nodes_gathered", "nodes_split", "nodes_black_skipped", "nodes_unseen_skipped"];
             let total: u64 = nodes.iter().map(|name| report.counters[*name]).sum();
             assert_eq!(total as usize, scene.mesh.node_vertices.len());
         }
@@ -237,7 +228,7 @@ mod tests {
     }
 
     /// A floor lit by a wall at one of its edges, seen from above: its middle is the mean of its corners. Those at the
-    /// wall, where nothing else adjoins, are approached along the diagonal too, and see the wall under 135 of 360 degrees.
+    /// wall are split, and give the middle the mean of 1/2 along the wall and 1/4 across.
     #[test]
     fn middle_of_an_element_is_the_mean_of_its_corners() {
         let mut mesh = empty_mesh();
@@ -253,6 +244,7 @@ mod tests {
         let far = (1f64.atan() - 0.5f64.sqrt() * 0.5f64.sqrt().atan()) / std::f64::consts::TAU;
         let want = 0.5 * (0.375 + far) * FRAC_1_PI;
         let middle = picture.pixels[4 * 9 + 4][0];
-        assert!((middle - want).abs() < 1e-5, "{middle}, want {want}");
+        // The limits are taken at 1e-4 of an edge's length.
+        assert!((middle - want).abs() < 3e-4, "{middle}, want {want}");
     }
 }

@@ -116,7 +116,9 @@ fn render_writes_picture_preview_and_report() {
     // The ceiling is black, and the wall behind the eye is not seen.
     assert_eq!(report["counters"]["nodes_black_skipped"], 4);
     assert_eq!(report["counters"]["nodes_unseen_skipped"], 4);
-    assert_eq!(report["counters"]["nodes_gathered"], 16);
+    assert_eq!(report["counters"]["nodes_gathered"], 0);
+    assert_eq!(report["counters"]["nodes_split"], 16);
+    assert_eq!(report["counters"]["node_edges_gathered"], 32);
     let preview = std::fs::read(folder.path().join("s.png")).unwrap();
     assert_eq!(&preview[..8], b"\x89PNG\r\n\x1a\n");
 }
