@@ -2,8 +2,9 @@
 
 use crate::camera::{Camera, Lens, Wishes};
 use crate::error::Result;
-use crate::exr_file::{self, Precision};
+use crate::exr_file::{self, Fit, Precision};
 use crate::lit_scene::LitScene;
+use crate::picture::Picture;
 use crate::{TOOL, VERSION, info, points, preview, probe, render};
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand};
@@ -179,15 +180,17 @@ fn run_render(arguments: &RenderArguments, common: &Common) -> Result<()> {
     Ok(())
 }
 
-fn warn_of_range(picture: &crate::picture::Picture, precision: Precision, report: &mut Report) {
-    let out = exr_file::out_of_range(picture, precision);
-    if out.too_large > 0 {
-        report.warn(format!("{} values are too large and become infinite; give --float", out.too_large));
-    }
-    if out.too_small > 0 && precision == Precision::Half {
-        let text =
-            format!("{} values are below 6.1e-5, where halves lose digits; give --float", out.too_small);
-        report.warn(text);
+fn warn_of_range(picture: &Picture, precision: Precision, report: &mut Report) {
+    let remedy = if precision == Precision::Half { "give --float" } else { "scale the lamps" };
+    match exr_file::fit(picture, precision) {
+        Fit::Good => {}
+        Fit::TooBright(count) => {
+            report.warn(format!("{count} values are too large to store and become infinite; {remedy}"));
+        }
+        Fit::TooDark => {
+            let highest = picture.highest();
+            report.warn(format!("the picture is too dark to keep all digits (at most {highest:.1e}); {remedy}"));
+        }
     }
 }
 

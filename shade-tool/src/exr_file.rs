@@ -30,25 +30,34 @@ pub enum Precision {
     Float,
 }
 
-/// Values that a precision cannot hold.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct OutOfRange {
-    /// Written as infinity.
-    pub too_large: usize,
-    /// Not zero, and smaller than the smallest number of full precision.
-    pub too_small: usize,
+/// A picture whose brightest value is below this many of the smallest numbers of full precision is too dark for its
+/// precision: a thousandth of the brightest, which an eye still sees, loses digits.
+const DARK: f64 = 1000.0;
+
+/// How a picture fits a precision.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fit {
+    /// All values that matter keep their digits.
+    Good,
+    /// So many values become infinite.
+    TooBright(usize),
+    /// Visible values lose digits, or vanish.
+    TooDark,
 }
 
-/// Counts the channel values of a picture that `precision` cannot hold.
-pub fn out_of_range(picture: &Picture, precision: Precision) -> OutOfRange {
+/// How the picture fits the precision.
+pub fn fit(picture: &Picture, precision: Precision) -> Fit {
     let (largest, smallest) = match precision {
         Precision::Half => (f16::MAX.to_f64(), f16::MIN_POSITIVE.to_f64()),
         Precision::Float => (f64::from(f32::MAX), f64::from(f32::MIN_POSITIVE)),
     };
-    picture.pixels.iter().flatten().fold(OutOfRange::default(), |count, &x| OutOfRange {
-        too_large: count.too_large + usize::from(x > largest),
-        too_small: count.too_small + usize::from(x > 0.0 && x < smallest),
-    })
+    let too_large = picture.pixels.iter().flatten().filter(|&&x| x > largest).count();
+    let highest = picture.highest();
+    match too_large {
+        0 if highest > 0.0 && highest < DARK * smallest => Fit::TooDark,
+        0 => Fit::Good,
+        _ => Fit::TooBright(too_large),
+    }
 }
 
 /// Writes the picture; an identical file is left alone.
@@ -162,9 +171,16 @@ mod tests {
     }
 
     #[test]
-    fn values_out_of_range_are_counted() {
-        let picture = Picture { width: 1, height: 1, pixels: vec![[7e4, 1e-6, 0.0]] };
-        assert_eq!(out_of_range(&picture, Precision::Half), OutOfRange { too_large: 1, too_small: 1 });
-        assert_eq!(out_of_range(&picture, Precision::Float), OutOfRange::default());
+    fn pictures_too_bright_or_too_dark_for_halves_are_noticed() {
+        for (pixel, half) in [
+            ([7e4, 1e-6, 8e4], Fit::TooBright(2)),
+            ([0.05, 0.01, 0.0], Fit::TooDark),
+            ([0.1, 1e-6, 0.0], Fit::Good),
+            ([0.0, 0.0, 0.0], Fit::Good),
+        ] {
+            let picture = Picture { width: 1, height: 1, pixels: vec![pixel] };
+            assert_eq!(fit(&picture, Precision::Half), half, "{pixel:?}");
+            assert_eq!(fit(&picture, Precision::Float), Fit::Good, "{pixel:?}");
+        }
     }
 }
