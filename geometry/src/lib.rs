@@ -9,6 +9,7 @@ pub mod area_rule;
 pub mod contour;
 pub mod edge_pair;
 pub mod gather;
+pub mod merge;
 pub mod occluded;
 pub mod occluder;
 pub mod pair;
