@@ -18,6 +18,7 @@ pub mod plane;
 pub mod point_factor;
 pub mod polygon;
 pub mod quadrature;
+pub mod ray_cast;
 pub mod shadow_planes;
 pub mod sides;
 pub mod unoccluded;
