@@ -276,7 +276,26 @@ impl Matrix {
         Ok(sums.iter().zip(areas).map(|(sum, area)| sum / area).collect())
     }
 
+    /// Refuses what this version has no use for: one part taken for the whole would silently lose light.
+    fn check_is_whole(&self) -> Result<()> {
+        let record = self.record();
+        let refuse = |part: &str, found: String, expected: &str, remedy: &str| {
+            Err(Error::format(self.path(), part, found, expected, remedy))
+        };
+        if (record.part, record.parts) != (0, 1) {
+            let found = format!("part {} of {}", record.part, record.parts);
+            return refuse("header", found, "a whole matrix", "compute the matrix in one file");
+        }
+        if !record.symmetric || record.extended {
+            let found = format!("symmetric {}, extended {}", record.symmetric, record.extended);
+            let remedy = "this program is older than the file: update it";
+            return refuse("header", found, "symmetric true, extended false", remedy);
+        }
+        Ok(())
+    }
+
     fn check(&self) -> Result<()> {
+        self.check_is_whole()?;
         let elements = u64::from(self.record().elements);
         let values = self.values()?;
         let mut stored = 0u64;
