@@ -2,10 +2,12 @@
 
 use crate::tile::{self, Counts, Leaf, Scene, Tile};
 use anyhow::Context;
+use geometry::merge::merge_coplanar;
 use geometry::occluder::Occluder;
 use geometry::pair::Accuracy;
 use geometry::patch::Patch;
 use geometry::sides::SideBits;
+use glam::DVec3;
 use interchange::digest::Digest;
 use interchange::ids::ElementId;
 use interchange::matrix::{self, Block, BlockKind, MatrixRecord, Precision, Values};
@@ -70,15 +72,18 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     bar.finish_and_clear();
 
     let matrix = assemble(&scene, &leaves, &pairs, &tiles, request.tolerance);
-    note(&mut report, &mesh, &matrix, &tiles, request.tolerance);
+    note(&mut report, &mesh, scene.occluders.len(), &matrix, &tiles, request.tolerance);
     report.phase("write", || write(request, digest, &matrix))?;
     report.write_beside(&request.output)?;
     Ok(finish(request.tolerance, &matrix))
 }
 
 fn prepare(mesh: &Mesh) -> anyhow::Result<Scene> {
-    let occluders: Vec<Occluder> = (0..mesh.occluders.len())
-        .filter_map(|k| Occluder::new(mesh.occluder_corners(k), mesh.occluder_faces[k].0))
+    let pieces = mesh.occluders.rows().map(|row| row.iter().map(|v| v.0).collect()).collect();
+    let positions: Vec<DVec3> = mesh.vertices.iter().copied().map(DVec3::from_array).collect();
+    let occluders: Vec<Occluder> = merge_coplanar(pieces, &positions)
+        .into_iter()
+        .filter_map(|piece| Occluder::new(piece.iter().map(|&k| positions[k as usize]).collect()))
         .collect();
     let patches = mesh
         .element_ids()
@@ -185,12 +190,20 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().copied().fold(0.0, f64::max)
 }
 
-fn note(report: &mut Report, mesh: &Mesh, matrix: &Assembled, tiles: &[Tile], tolerance: f64) {
+fn note(
+    report: &mut Report,
+    mesh: &Mesh,
+    occluders: usize,
+    matrix: &Assembled,
+    tiles: &[Tile],
+    tolerance: f64,
+) {
     let mut counts = Counts::default();
     tiles.iter().for_each(|tile| counts.add(&tile.counts));
     let n = mesh.element_count();
     report.count("elements", n);
     report.count("occluders", mesh.occluders.len());
+    report.count("occluders after merging", occluders);
     report.count("pairs", n * (n + 1) / 2);
     report.count("pairs of one face (skipped)", counts.same_face);
     report.count("pairs facing away (skipped)", counts.invisible);

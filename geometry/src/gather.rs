@@ -51,14 +51,10 @@ impl Cone {
 }
 
 impl Gatherer {
-    /// Prepares convex `occluders` with the faces they are pieces of, and convex `elements`, one-sided, front
-    /// counter-clockwise. Elements and occluders without area take no part.
-    pub fn new(occluders: Vec<Vec<DVec3>>, occluder_faces: Vec<u32>, elements: Vec<Vec<DVec3>>) -> Gatherer {
-        let occluders: Vec<Occluder> = occluders
-            .into_iter()
-            .zip(occluder_faces)
-            .filter_map(|(c, face)| Occluder::new(c, face))
-            .collect();
+    /// Prepares convex `occluders` and convex `elements`, one-sided, front counter-clockwise. Elements and occluders
+    /// without area take no part.
+    pub fn new(occluders: Vec<Vec<DVec3>>, elements: Vec<Vec<DVec3>>) -> Gatherer {
+        let occluders: Vec<Occluder> = occluders.into_iter().filter_map(Occluder::new).collect();
         let prepare = |(index, corners): (usize, Vec<DVec3>)| {
             let patch = Patch::new(corners)?;
             let bits = SideBits::of_patch(&patch.corners, &patch.plane, patch.radius, &occluders);
@@ -71,14 +67,12 @@ impl Gatherer {
     /// Calls `visit(element, F)` for every element with a form factor F > 0 from `point` on a plane with unit `normal`,
     /// in the elements' order.
     ///
-    /// `on_face` is the face the point lies on, if any: its pieces never block it; faces coplanar with it do not
-    /// either, for none of their parts is in front. A point within rounding of an element's edge takes the limit from
-    /// the side it is on.
+    /// The face the point lies on never blocks it, nor do faces coplanar with it: none of their parts is in front. A
+    /// point within rounding of an element's edge takes the limit from the side it is on.
     pub fn factors(
         &self,
         point: DVec3,
         normal: DVec3,
-        on_face: Option<u32>,
         scratch: &mut Scratch,
         visit: &mut dyn FnMut(usize, f64),
     ) {
@@ -94,12 +88,9 @@ impl Gatherer {
                 continue;
             }
             let cone = Cone::around(element.centroid - point, element.radius);
-            let may_block = |k: usize| {
-                Some(self.occluders[k].face) != on_face
-                    && match (&cone, &cones[k]) {
-                        (Some(cone), Some(blocker)) => cone.may_meet(blocker),
-                        _ => true,
-                    }
+            let may_block = |k: usize| match (&cone, &cones[k]) {
+                (Some(cone), Some(blocker)) => cone.may_meet(blocker),
+                _ => true,
             };
             let mut blocked = false;
             sides.for_each_candidate(element_sides, self.occluders.len(), |k| blocked |= may_block(k));
@@ -149,19 +140,17 @@ mod tests {
         for scale in [1e-6, 1.0, 1e6] {
             let mut faces = cube_faces(0.0, scale, true);
             faces.extend(cube_faces(0.25 * scale, 0.75 * scale, false));
-            let ids: Vec<u32> = (0..faces.len() as u32).collect();
-            let gatherer = Gatherer::new(faces.clone(), ids, faces);
+            let gatherer = Gatherer::new(faces.clone(), faces);
             let mut scratch = Scratch::default();
-            for (point, normal, face) in [
-                (DVec3::new(0.3, 0.4, 0.0), DVec3::Z, 0),
-                (DVec3::new(0.1, 0.9, 0.0), DVec3::Z, 0),
-                (DVec3::new(0.5, 0.5, 0.75), DVec3::Z, 7),
-                (DVec3::new(1e-7, 1e-7, 0.0), DVec3::Z, 0),
-                (DVec3::new(0.25, 0.5, 0.74999), DVec3::NEG_X, 8),
+            for (point, normal) in [
+                (DVec3::new(0.3, 0.4, 0.0), DVec3::Z),
+                (DVec3::new(0.1, 0.9, 0.0), DVec3::Z),
+                (DVec3::new(0.5, 0.5, 0.75), DVec3::Z),
+                (DVec3::new(1e-7, 1e-7, 0.0), DVec3::Z),
+                (DVec3::new(0.25, 0.5, 0.74999), DVec3::NEG_X),
             ] {
                 let mut sum = 0.0;
-                gatherer
-                    .factors(point * scale, normal, Some(face), &mut scratch, &mut |_, factor| sum += factor);
+                gatherer.factors(point * scale, normal, &mut scratch, &mut |_, factor| sum += factor);
                 assert!((sum - 1.0).abs() < 1e-12, "{point} at scale {scale}: {sum}");
             }
         }

@@ -13,6 +13,9 @@ use std::collections::BinaryHeap;
 
 /// Points a side of the strong rule (degree 6) that a cell without shadow planes is compared with.
 const STRONG_POINTS: usize = 4;
+/// Corners are looked at from this part of the way to the centroid inside: on a contact line the corner itself has no
+/// view of its own.
+const CORNER_INSET: f64 = 1e-3;
 /// A shadow plane that leaves less than this part of the cell's size on one side is not worth a cut.
 const WORTHLESS_CUT: f64 = 1e-9;
 
@@ -71,7 +74,9 @@ impl View<'_> {
         visible_factor(point, self.normal, self.source, self.blockers.iter().copied(), self.scratch)
     }
 
-    /// Integral over a convex cell by Radon's rule, and its distance from the degree-2 rule on four of the points.
+    /// Integral over a convex cell by Radon's rule, and the larger of its distances from two rules of degree 2: one on
+    /// four of its points, one on the corners and the centroid. The corners catch light or shadow that only reaches
+    /// into a cell's tip, where all seven points would agree on a wrong value.
     fn weak(&mut self, cell: &[DVec3]) -> (f64, f64) {
         let (mut value, mut error) = (0.0, 0.0);
         for k in 2..cell.len() {
@@ -80,14 +85,19 @@ impl View<'_> {
             self.weights.clear();
             radon_rule(triangle, &mut self.points, &mut self.weights);
             let area = polygon::area(&triangle);
-            let (mut fine, mut coarse) = (0.0, 0.0);
+            let centroid = self.points[0];
+            let (mut fine, mut inner, mut outer) = (0.0, 0.0, 0.0);
             for n in 0..self.points.len() {
                 let f = self.at(self.points[n]);
                 fine += self.weights[n] * f;
-                coarse += RADON_INNER.get(n).map_or(0.0, |w| w * area * f);
+                inner += RADON_INNER.get(n).map_or(0.0, |w| w * area * f);
+                outer += if n == 0 { 0.75 * area * f } else { 0.0 };
+            }
+            for corner in triangle {
+                outer += area / 12.0 * self.at(corner + CORNER_INSET * (centroid - corner));
             }
             value += fine;
-            error += (fine - coarse).abs();
+            error += (fine - inner).abs().max((fine - outer).abs());
         }
         (value, error)
     }

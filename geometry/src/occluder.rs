@@ -16,17 +16,15 @@ pub struct Occluder {
     pub centre: DVec3,
     /// Largest distance of a corner from the centre.
     pub radius: f64,
-    /// Face it is a piece of.
-    pub face: u32,
 }
 
 impl Occluder {
     /// Prepares a convex polygon; `None` where its area is zero to rounding, for then it blocks nothing.
-    pub fn new(corners: Vec<DVec3>, face: u32) -> Option<Occluder> {
+    pub fn new(corners: Vec<DVec3>) -> Option<Occluder> {
         let plane = Plane::of_polygon(&corners)?;
         let centre = polygon::mean_corner(&corners);
         let radius = corners.iter().map(|&c| (c - centre).length()).fold(0.0, f64::max);
-        Some(Occluder { corners, plane, centre, radius, face })
+        Some(Occluder { corners, plane, centre, radius })
     }
 
     /// Whether every segment from `p` to `q` (convex point sets) crosses this polygon: then nothing is seen.
@@ -179,10 +177,10 @@ mod tests {
     #[test]
     fn a_larger_plate_between_covers_and_a_smaller_does_not() {
         let (p, q) = (square(1.0, 0.0), square(1.0, 2.0));
-        assert!(Occluder::new(square(1.0, 1.0), 0).unwrap().covers(&p, &q));
-        assert!(!Occluder::new(square(0.9, 1.0), 0).unwrap().covers(&p, &q));
-        assert!(!Occluder::new(square(3.0, 3.0), 0).unwrap().covers(&p, &q));
-        assert!(!Occluder::new(square(3.0, 0.0), 0).unwrap().covers(&p, &q));
+        assert!(Occluder::new(square(1.0, 1.0)).unwrap().covers(&p, &q));
+        assert!(!Occluder::new(square(0.9, 1.0)).unwrap().covers(&p, &q));
+        assert!(!Occluder::new(square(3.0, 3.0)).unwrap().covers(&p, &q));
+        assert!(!Occluder::new(square(3.0, 0.0)).unwrap().covers(&p, &q));
     }
 
     #[test]

@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn aligned_squares_have_the_known_point_values() {
         for down in [false, true] {
-            let blocker = [Occluder::new(square(1.0, 2.0, down), 0).unwrap()];
+            let blocker = [Occluder::new(square(1.0, 2.0, down)).unwrap()];
             for (x, y, want) in [
                 (1.4, 0.0, 0.0),
                 (1.75, 0.0, 0.003_940_506_609),
@@ -146,12 +146,12 @@ mod tests {
 
     #[test]
     fn overlapping_and_repeated_blockers_block_once() {
-        let one = Occluder::new(square(1.0, 2.0, false), 0).unwrap();
+        let one = Occluder::new(square(1.0, 2.0, false)).unwrap();
         let halves = [
             [(-1.0, -1.0), (0.3, -1.0), (0.3, 1.0), (-1.0, 1.0)],
             [(-0.2, -1.0), (1.0, -1.0), (1.0, 1.0), (-0.2, 1.0)],
         ]
-        .map(|c| Occluder::new(c.map(|(x, y)| DVec3::new(x, y, 2.0)).to_vec(), 0).unwrap());
+        .map(|c| Occluder::new(c.map(|(x, y)| DVec3::new(x, y, 2.0)).to_vec()).unwrap());
         for (x, y) in [(1.75, 0.0), (2.0, 2.0), (-1.9, 0.4), (0.0, 0.0)] {
             let want = seen(x, y, std::slice::from_ref(&one));
             assert!((seen(x, y, &[one.clone(), one.clone()]) - want).abs() < 1e-16);
@@ -163,7 +163,7 @@ mod tests {
     fn a_contact_wall_blocks_one_side_only() {
         // Wall x = 0, |y| <= 1, 0 <= z <= 1 on the floor; light [1.5, 2.5] x [-.5, .5] at z = 4.
         let wall = [(-1.0, 0.0), (1.0, 0.0), (1.0, 1.0), (-1.0, 1.0)].map(|(y, z)| DVec3::new(0.0, y, z));
-        let wall = [Occluder::new(wall.to_vec(), 0).unwrap()];
+        let wall = [Occluder::new(wall.to_vec()).unwrap()];
         let light = [(1.5, 0.5), (2.5, 0.5), (2.5, -0.5), (1.5, -0.5)].map(|(x, y)| DVec3::new(x, y, 4.0));
         let seen = |x: f64, y: f64| {
             visible_factor(DVec3::new(x, y, 0.0), DVec3::Z, &light, &wall, &mut Scratch::default())
@@ -179,7 +179,7 @@ mod tests {
     fn a_blocker_that_crosses_the_light_hides_only_what_is_behind_it() {
         // A vertical plate through the light's middle, from z = 2 to 5, across the whole light: from x = 1 the far half is hidden.
         let plate = [(-2.0, 2.0), (2.0, 2.0), (2.0, 5.0), (-2.0, 5.0)].map(|(y, z)| DVec3::new(0.0, y, z));
-        let plate = [Occluder::new(plate.to_vec(), 0).unwrap()];
+        let plate = [Occluder::new(plate.to_vec()).unwrap()];
         let near_half: Vec<DVec3> =
             [(0.0, 0.5), (0.5, 0.5), (0.5, -0.5), (0.0, -0.5)].map(|(x, y)| DVec3::new(x, y, 4.0)).to_vec();
         let point = DVec3::new(1.0, 0.0, 0.0);

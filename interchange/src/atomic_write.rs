@@ -48,7 +48,7 @@ pub fn write(path: &Path, fill: impl FnOnce(&mut dyn WriteSeek) -> std::io::Resu
 pub trait WriteSeek: Write + Seek {}
 impl<T: Write + Seek> WriteSeek for T {}
 
-/// Writes `bytes` to `path`, as [`write`] does.
+/// Writes `bytes` to `path`, as [`write()`] does.
 pub fn write_bytes(path: &Path, bytes: &[u8]) -> Result<Outcome> {
     write(path, |out| out.write_all(bytes))
 }

@@ -9,14 +9,14 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The operating system refused.
-    #[error("{}: cannot {action}: {source}{remedy}", path.display())]
+    #[error("{}: cannot {action}: {cause}{remedy}", path.display())]
     Io {
         /// File it happened to.
         path: PathBuf,
         /// What was tried, as a verb: `read`, `write`, `rename`.
         action: &'static str,
         /// What the system said.
-        source: std::io::Error,
+        cause: std::io::Error,
         /// Empty, or `; ` and what to do.
         remedy: String,
     },
@@ -84,7 +84,7 @@ impl Error {
             }
             _ => String::new(),
         };
-        Error::Io { path: path.to_owned(), action, source, remedy }
+        Error::Io { path: path.to_owned(), action, cause: source, remedy }
     }
 
     /// A binary file whose `part` is wrong.

@@ -1,0 +1,30 @@
+//! A picture in memory: linear RGB radiance, row 0 at the top.
+
+/// Luminance of linear RGB with the primaries of Rec. 709.
+pub fn luminance(rgb: [f64; 3]) -> f64 {
+    0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
+}
+
+/// Linear RGB pixels, W m^-2 sr^-1.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Picture {
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// Row after row from the top, each from the left.
+    pub pixels: Vec<[f64; 3]>,
+}
+
+impl Picture {
+    /// Mean over all pixels.
+    pub fn mean(&self) -> [f64; 3] {
+        let sum = self.pixels.iter().fold([0.0; 3], |sum, p| std::array::from_fn(|c| sum[c] + p[c]));
+        sum.map(|s: f64| s / self.pixels.len().max(1) as f64)
+    }
+
+    /// Largest value of any channel.
+    pub fn highest(&self) -> f64 {
+        self.pixels.iter().flatten().fold(0.0, |highest: f64, &x| highest.max(x))
+    }
+}
