@@ -3,6 +3,7 @@
 
 use crate::lit_scene::LitScene;
 use geometry::gather::{Gatherer, Scratch};
+use geometry::merge::merge_coplanar;
 use glam::DVec3;
 
 /// Points on the border of a face or element take the limit from inside: they are moved by this part of the way towards
@@ -25,7 +26,7 @@ pub struct Receiver {
     pub point: DVec3,
     /// Unit normal of the plane that receives.
     pub normal: DVec3,
-    /// Face that the point lies on; it and those coplanar with it never block.
+    /// Face that the point lies on; it and those coplanar with it never block, as none of them is in front.
     pub face: Option<u32>,
 }
 
@@ -37,12 +38,16 @@ pub struct Light<'a> {
 }
 
 impl<'a> Light<'a> {
-    /// The elements of the scene as sources, its faces as blockers.
+    /// The elements of the scene as sources, its faces as blockers. What blocks has no need of the borders between coplanar
+    /// faces.
     pub fn new(scene: &'a LitScene) -> Light<'a> {
         let mesh = &scene.mesh;
+        let positions: Vec<DVec3> = mesh.vertices.iter().map(|&v| v.into()).collect();
+        let pieces = mesh.occluders.rows().map(|piece| piece.iter().map(|v| v.0).collect()).collect();
+        let blockers = merge_coplanar(pieces, &positions);
+        let corners = |piece: &Vec<u32>| piece.iter().map(|&v| positions[v as usize]).collect();
         let elements = mesh.element_ids().map(|element| mesh.element_corners(element)).collect();
-        let gatherer =
-            Gatherer::new(scene.pieces(), mesh.occluder_faces.iter().map(|face| face.0).collect(), elements);
+        let gatherer = Gatherer::new(blockers.iter().map(corners).collect(), elements);
         Light { gatherer, radiosity: &scene.radiosity }
     }
 
@@ -54,7 +59,7 @@ impl<'a> Light<'a> {
                 *sum += factor * b_j;
             }
         };
-        self.gatherer.factors(receiver.point, receiver.normal, receiver.face, scratch, &mut add);
+        self.gatherer.factors(receiver.point, receiver.normal, scratch, &mut add);
         irradiance
     }
 }
