@@ -6,4 +6,6 @@
 #![forbid(unsafe_code)]
 
 pub mod compute;
+pub mod export;
+pub mod info;
 pub mod tile;

@@ -12,6 +12,7 @@ pub mod atomic_write;
 pub mod container;
 pub mod digest;
 pub mod error;
+pub mod grouping;
 pub mod ids;
 mod mapping;
 pub mod materials;

@@ -3,7 +3,7 @@
 use crate::digest::Digest;
 use crate::error::{Error, Result, nearest_name};
 use crate::materials::{Material, MaterialTable};
-use crate::scene::NONE;
+use crate::scene::{NONE, read_materials};
 use std::path::{Path, PathBuf};
 
 /// Where `mesh-tool build` leaves the table of `mesh`: `room.materials` for `room.mesh`.
@@ -35,8 +35,11 @@ pub fn load_materials(
 fn read(path: &Path) -> Result<(MaterialTable, Digest)> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     if ending.as_deref() == Some("mtl") {
-        let remedy = "make a table of it with mesh-tool materials and give that";
-        return Err(Error::whole(path, format!("MTL files cannot be read here yet; {remedy}")));
+        let (table, warnings) = read_materials(path)?;
+        let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+        let digest = Digest::of(&bytes);
+        warnings.iter().for_each(|warning| tracing::warn!("{warning}"));
+        return Ok((table, digest));
     }
     let (table, _, digest) = MaterialTable::read(path)?;
     Ok((table, digest))
@@ -87,6 +90,19 @@ mod tests {
         let (values, other_digest) = load_materials(&mesh, Some(&other), &names).unwrap();
         assert_eq!(values.iter().map(|m| m.diffuse[0]).collect::<Vec<_>>(), [0.1, 0.0, 0.2]);
         assert_ne!(digest, other_digest);
+    }
+
+    #[test]
+    fn an_mtl_file_stands_in_for_a_table() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mesh, mtl) = (folder.path().join("room.mesh"), folder.path().join("new.mtl"));
+        std::fs::write(&mtl, "newmtl white\nKd 0.8 0.8 0.8\nnewmtl lamp\nKd 0 0 0\nKe 2 3 4\n").unwrap();
+        let (values, digest) = load_materials(&mesh, Some(&mtl), &["lamp".into(), "white".into()]).unwrap();
+        assert_eq!((values[0].radiance, values[1].diffuse), ([2.0, 3.0, 4.0], [0.8; 3]));
+        assert_eq!(digest, Digest::of(&std::fs::read(&mtl).unwrap()));
+        std::fs::write(&mtl, "newmtl white\nKd 1.5 0.8 0.8\n").unwrap();
+        let message = load_materials(&mesh, Some(&mtl), &["white".into()]).unwrap_err().to_string();
+        assert!(message.contains("new.mtl:2"), "{message}");
     }
 
     #[test]

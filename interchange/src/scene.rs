@@ -90,6 +90,7 @@ impl Scene {
     pub fn read(path: &Path, two_sided: &[String]) -> Result<Scene> {
         obj::read(path, two_sided)
     }
+
     /// The files it was read from, in a fixed order: the OBJ, its MTL files, and the toml if there is one.
     /// Whatever is made from the scene depends on them (a line of a Makefile, say).
     pub fn dependencies(&self) -> Vec<PathBuf> {

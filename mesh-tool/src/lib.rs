@@ -1,1 +1,40 @@
-//! Scene to elements.
+//! Scene to elements: `mesh-tool build` and `mesh-tool materials`.
+//!
+//! The way of a scene: [`clean`] welds and drops, [`sheets`] finds what lies in one plane and looks the same way,
+//! [`contact`] where other faces stand on it or poke through it; then either [`given`] leaves the faces as they are, or
+//! [`meshed`] triangulates each plane as a whole ([`planar`], [`triangulation`], [`seeds`], [`refine`]); [`assemble`]
+//! numbers elements ([`cluster`]) and nodes ([`nodes`]).
+//!
+//! # Limitations
+//! Faces keep the orientation they are given in. Parts of faces that nothing can see (under a block, inside a body)
+//! are meshed like the rest. Walls that meet at an edge are split alike along it, except where refinement near a
+//! narrow angle splits one of them further.
+
+#![forbid(unsafe_code)]
+
+pub mod assemble;
+pub mod build;
+pub mod clean;
+pub mod cluster;
+pub mod contact;
+pub mod convex;
+pub mod depfile;
+pub mod frame;
+pub mod given;
+pub mod info;
+pub mod meshed;
+pub mod nodes;
+pub mod patch;
+pub mod places;
+pub mod planar;
+pub mod refine;
+pub mod seeds;
+pub mod sheets;
+pub mod triangulation;
+
+pub use build::{Options, build, provenance};
+
+/// Name of the tool.
+pub const NAME: &str = "mesh-tool";
+/// Version of the tool.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");

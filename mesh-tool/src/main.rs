@@ -1,1 +1,150 @@
-fn main() {}
+//! Command line of mesh-tool.
+
+use clap::{Args, Parser, Subcommand};
+use interchange::provenance::Provenance;
+use interchange::report::Report;
+use interchange::scene::Scene;
+use interchange::tool::{self, Common, Finish};
+use interchange::{Error, atomic_write};
+use mesh_tool::{NAME, Options, VERSION, depfile, info};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Turns a scene into elements
+#[derive(Debug, Parser)]
+#[command(name = "mesh-tool", version, about, after_help = EXIT_CODES)]
+struct CommandLine {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    common: Common,
+}
+
+const EXIT_CODES: &str = "Exit codes: 0 done, 1 failed, 2 bad usage.";
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Write the scene's material table, and beside it NAME.surfaces (what geometry depends on)
+    Materials {
+        #[command(flatten)]
+        scene: SceneArgs,
+        /// Material table to write
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
+        /// Also write a make rule saying what the table depends on
+        #[arg(long, value_name = "FILE")]
+        depfile: Option<PathBuf>,
+    },
+    /// Write the scene's mesh, and beside it NAME.materials, NAME.surfaces and a report
+    ///
+    /// Without --max-edge and --elements the faces are elements as given: only what overlaps, crosses or is concave
+    /// is cut.
+    Build {
+        #[command(flatten)]
+        scene: SceneArgs,
+        /// Mesh to write
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
+        /// Mesh with triangles whose edges are no longer than this, in the scene's unit of length
+        #[arg(long, value_name = "L", value_parser = positive)]
+        max_edge: Option<f64>,
+        /// Mesh with about this many triangles of equal area; with --max-edge too, the finer of the two wins
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+        elements: Option<u32>,
+    },
+    /// Say what is in a mesh or a material table
+    Info {
+        /// Mesh (.mesh) or material table (.materials)
+        file: PathBuf,
+        /// As JSON, for scripts
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+#[derive(Debug, Args)]
+struct SceneArgs {
+    /// Scene (.obj)
+    scene: PathBuf,
+    /// Let both sides of this material emit, reflect and receive (besides those the scene's toml lists)
+    #[arg(long, value_name = "NAME")]
+    two_sided: Vec<String>,
+}
+
+impl SceneArgs {
+    fn read(&self) -> interchange::Result<Scene> {
+        Scene::read(&self.scene, &self.two_sided)
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let length: f64 = text.parse().map_err(|_| "a length is a number".to_owned())?;
+    if length.is_finite() && length > 0.0 { Ok(length) } else { Err("a length is finite and above 0".into()) }
+}
+
+fn main() -> ExitCode {
+    let line = CommandLine::parse();
+    line.common.start();
+    tool::exit_code(NAME, run(&line).map(|()| Finish::Done))
+}
+
+fn run(line: &CommandLine) -> anyhow::Result<()> {
+    match &line.command {
+        Command::Materials { scene, output, depfile } => {
+            let scene = scene.read()?;
+            for warning in &scene.warnings {
+                tracing::warn!("{warning}");
+            }
+            write_materials(&scene, output)?;
+            if let Some(path) = depfile {
+                let rule = depfile::rule(output, &depfile::dependencies(&scene));
+                atomic_write::write_bytes(path, rule.as_bytes())?;
+            }
+        }
+        Command::Build { scene: args, output, max_edge, elements } => {
+            let options = Options { max_edge: *max_edge, elements: *elements };
+            let mut report = Report::new(NAME, VERSION);
+            report.flags = options.flags();
+            report.flags.extend(args.two_sided.iter().map(|name| format!("--two-sided {name}")));
+            let scene = report.phase("read", || args.read())?;
+            for warning in &scene.warnings {
+                report.warn(warning.clone());
+            }
+            refuse_overwriting(&scene, output)?;
+            let mesh = mesh_tool::build(&scene, &options, &mut report)?;
+            let provenance = mesh_tool::provenance(&scene, &options);
+            report.phase("write", || -> interchange::Result<()> {
+                write_materials(&scene, &output.with_extension("materials"))?;
+                mesh.write(output, provenance)?;
+                Ok(())
+            })?;
+            report.write_beside(output)?;
+        }
+        Command::Info { file, json } => tool::print_data(&info::describe(file, *json)?)?,
+    }
+    Ok(())
+}
+
+/// Writes the table and, beside it, what geometry depends on. `build` and `materials` write the same bytes.
+fn write_materials(scene: &Scene, path: &Path) -> interchange::Result<()> {
+    refuse_overwriting(scene, path)?;
+    let provenance = Provenance::new(NAME, VERSION).input("scene", scene.digest);
+    scene.materials.write_surfaces(&path.with_extension("surfaces"))?;
+    scene.materials.write(path, provenance)?;
+    Ok(())
+}
+
+/// A slip like `-o scene.obj` must not cost the user the scene.
+fn refuse_overwriting(scene: &Scene, output: &Path) -> interchange::Result<()> {
+    let same = |file: &PathBuf| match (file.canonicalize(), output.canonicalize()) {
+        (Ok(a), Ok(b)) => a == b,
+        _ => false,
+    };
+    if depfile::dependencies(scene).iter().any(same) {
+        return Err(Error::whole(
+            output,
+            "this is an input of the scene; choose another name for the output",
+        ));
+    }
+    Ok(())
+}

@@ -1,1 +1,44 @@
-//! Exchange matrix and materials to radiosity.
+//! Exchange matrix and materials to radiosity: B = E + rho H, H = F B, per element and colour channel.
+//!
+//! [`mod@solve`] finds the radiosity by conjugate gradients or by factorisation and stops when a proved
+//! [`bound`] on the error meets the tolerance; [`error_budget`] says what errors of the matrix add to that, and
+//! [`energy`] where the power went. [`run`], [`export`] and [`info`] are the program's subcommands.
+//!
+//! Two parallel plates that see nothing but each other, rho = 1/2, one of them glowing:
+//!
+//! ```
+//! use interchange::matrix::{Block, BlockKind, Values};
+//! use solve_tool::{channels::Channel, product::Product, solve::{Solver, solve}, system::System};
+//!
+//! // S = [[0, 1], [1, 0]], the upper triangle row after row.
+//! let blocks = [Block::new(BlockKind::Triangle, 0..2, 0..2, 0)];
+//! let product = Product::from_parts(2, &blocks, Values::F64(&[0.0, 1.0, 0.0]));
+//! let system = System::from_parts(product, &[1.0, 1.0], &[0.0, 0.0], 0.0);
+//! let grey = Channel { reflectance: vec![0.5, 0.5], exitance: vec![1.0, 0.0] };
+//! let solved = solve(&system, &[grey.clone(), grey.clone(), grey], Solver::Auto, 1e-12)?;
+//! // B1 = 1 / (1 - 1/4), B2 = B1 / 2.
+//! assert!((solved.channels[0].radiosity[0] - 4.0 / 3.0).abs() < 1e-12);
+//! assert!(solved.channels[0].bound <= 1e-12);
+//! # Ok::<(), solve_tool::error::SolveError>(())
+//! ```
+//!
+//! # Limitations
+//! The matrix must be whole (one part) and symmetric. Diffuse reflection only; channels do not mix.
+
+pub mod bound;
+mod cg;
+pub mod channels;
+pub mod components;
+mod direct;
+pub mod energy;
+mod equation;
+pub mod error;
+pub mod error_budget;
+pub mod export;
+pub mod info;
+mod kernel;
+pub mod lossless;
+pub mod product;
+pub mod run;
+pub mod solve;
+pub mod system;

@@ -1,1 +1,94 @@
-fn main() {}
+//! solve-tool: exchange matrix and materials to radiosity.
+//!
+//! Exit codes: 0 done; 1 failed; 2 bad usage; 3 written, but the asked tolerance was not reached.
+
+use clap::{Parser, Subcommand};
+use interchange::grouping::By;
+use interchange::tool::{Common, Finish, exit_code, print_data};
+use solve_tool::run::SolveRequest;
+use solve_tool::solve::Solver;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Radiosity from an exchange matrix and materials.
+#[derive(Debug, Parser)]
+#[command(version, arg_required_else_help = true)]
+struct Cli {
+    #[command(flatten)]
+    common: Common,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Solve for the radiosity of every element
+    Solve {
+        /// Exchange matrix (.ff)
+        matrix: PathBuf,
+        /// The mesh it was computed for
+        #[arg(long, value_name = "MESH")]
+        mesh: PathBuf,
+        /// Material table or MTL file in place of the .materials beside the mesh
+        #[arg(long, value_name = "FILE")]
+        materials: Option<PathBuf>,
+        /// Solution to write (.sol)
+        #[arg(long, short, value_name = "SOL")]
+        output: PathBuf,
+        /// Method
+        #[arg(long, value_enum, default_value_t = Solver::Auto)]
+        solver: Solver,
+        /// Error to be proved, relative to the emitted power: sum of A |error of B| over sum of A E
+        #[arg(long, value_name = "E", default_value = "1e-6", value_parser = positive)]
+        tolerance: f64,
+    },
+    /// Write radiosity and irradiance as a table
+    Export {
+        /// Solution (.sol)
+        solution: PathBuf,
+        /// The mesh it was computed on
+        #[arg(long, value_name = "MESH")]
+        mesh: PathBuf,
+        /// What a row stands for
+        #[arg(long, value_enum)]
+        by: By,
+        /// Table to write (.csv or .npy)
+        #[arg(long, short, value_name = "TABLE")]
+        output: PathBuf,
+    },
+    /// Describe a solution
+    Info {
+        /// Solution (.sol)
+        file: PathBuf,
+        /// For machines
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(x) if x.is_finite() && x > 0.0 => Ok(x),
+        _ => Err("a finite number above 0 is needed".into()),
+    }
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    cli.common.start();
+    exit_code("solve-tool", run(cli.command))
+}
+
+fn run(command: Command) -> anyhow::Result<Finish> {
+    match command {
+        Command::Solve { matrix, mesh, materials, output, solver, tolerance } => {
+            let request = SolveRequest { matrix, mesh, materials, output, solver, tolerance };
+            return Ok(solve_tool::run::run(&request)?);
+        }
+        Command::Export { solution, mesh, by, output } => {
+            solve_tool::export::run(&solution, &mesh, by, &output)?;
+        }
+        Command::Info { file, json } => print_data(&solve_tool::info::describe(&file, json)?)?,
+    }
+    Ok(Finish::Done)
+}

@@ -1,0 +1,181 @@
+//! `formfactor-tool export`: the factors F as a table, per element, face or group.
+//!
+//! Rows emit: entry (i, j) is F(i -> j), the share of what leaves i that reaches j. For faces and groups it is the
+//! sum of S over the elements of both, divided by the area of i. Both sides of a two-sided face count as one face,
+//! their areas summed. Rows are made in bands, so that a table of many elements needs no memory of its size.
+
+use interchange::atomic_write;
+use interchange::error::{Error, Result};
+use interchange::grouping::{By, Grouping};
+use interchange::matrix::{Block, BlockKind, Matrix, Values};
+use interchange::mesh::Mesh;
+use interchange::tables::{TableFormat, number, write_csv, write_npy};
+use std::io::SeekFrom;
+use std::ops::Range;
+use std::path::Path;
+
+/// Entries of the table held in memory at a time: 128 MB. Each band reads the blocks it touches once.
+const BAND_ENTRIES: usize = 1 << 24;
+
+/// Writes F to `output`, whose ending says how: `.csv` with a header of names, `.npy` as a dense float64 array,
+/// `.mtx` as MatrixMarket coordinates of the entries above 0.
+pub fn run(matrix_path: &Path, mesh_path: &Path, by: By, output: &Path) -> Result<()> {
+    let format = TableFormat::of(output, &[TableFormat::Csv, TableFormat::Npy, TableFormat::Mtx])?;
+    let (mesh, _, digest) = Mesh::read(mesh_path)?;
+    let matrix = Matrix::open(matrix_path)?;
+    matrix.belongs_to(mesh_path, digest, mesh.element_count())?;
+    if matrix.record().parts != 1 {
+        let (part, parts) = (matrix.record().part + 1, matrix.record().parts);
+        let message = format!("holds part {part} of {parts}; export needs the whole matrix");
+        return Err(Error::whole(matrix_path, message));
+    }
+    let grouping = Grouping::new(&mesh, by);
+    let factors = Factors::new(&matrix, &grouping)?;
+    match format {
+        TableFormat::Csv => csv(&factors, &grouping, output),
+        TableFormat::Npy => {
+            let values = factors.rows().flat_map(|(_, row)| row);
+            write_npy(output, factors.count, factors.count, values).map(|_| ())
+        }
+        TableFormat::Mtx => mtx(&factors, by, output),
+    }
+}
+
+fn csv(factors: &Factors<'_>, grouping: &Grouping, output: &Path) -> Result<()> {
+    let header: Vec<String> =
+        std::iter::once(grouping.title.to_owned()).chain(grouping.labels.iter().cloned()).collect();
+    let lines = factors.rows().map(|(key, row)| {
+        std::iter::once(grouping.labels[key].clone()).chain(row.into_iter().map(number)).collect()
+    });
+    write_csv(output, &header, lines).map(|_| ())
+}
+
+/// MatrixMarket by hand: three lines of header, then `row column value`, counting from 1. The number of entries is
+/// known at the end only; its place is kept free in the header.
+fn mtx(factors: &Factors<'_>, by: By, output: &Path) -> Result<()> {
+    let kind = clap::ValueEnum::to_possible_value(&by);
+    let kind = kind.as_ref().map_or("", |value| value.get_name());
+    atomic_write::write(output, |out| {
+        writeln!(out, "%%MatrixMarket matrix coordinate real general")?;
+        writeln!(out, "% F(row -> column), rows and columns by {kind}")?;
+        let size_line = out.stream_position()?;
+        let size = |entries: u64| format!("{} {} {entries:<20}\n", factors.count, factors.count);
+        out.write_all(size(0).as_bytes())?;
+        let mut entries = 0;
+        for (row, values) in factors.rows() {
+            for (column, &value) in values.iter().enumerate().filter(|(_, value)| **value != 0.0) {
+                writeln!(out, "{} {} {}", row + 1, column + 1, number(value))?;
+                entries += 1;
+            }
+        }
+        out.seek(SeekFrom::Start(size_line))?;
+        out.write_all(size(entries).as_bytes())?;
+        out.seek(SeekFrom::End(0)).map(|_| ())
+    })
+    .map(|_| ())
+}
+
+/// F between the keys of a grouping, row by row.
+struct Factors<'a> {
+    blocks: &'a [Block],
+    values: Values<'a>,
+    keys: &'a [u32],
+    /// Area of each key.
+    areas: Vec<f64>,
+    count: usize,
+    /// Rows made at a time.
+    band: usize,
+}
+
+impl<'a> Factors<'a> {
+    fn new(matrix: &'a Matrix, grouping: &'a Grouping) -> Result<Self> {
+        let element_areas = matrix.areas()?;
+        let count = grouping.len();
+        Ok(Self {
+            blocks: matrix.blocks()?,
+            values: matrix.values()?,
+            keys: &grouping.key_of_element,
+            areas: grouping.sums(|i| element_areas[i]),
+            count,
+            band: (BAND_ENTRIES / count.max(1)).max(1),
+        })
+    }
+
+    /// All rows in order: key and F(key -> every key).
+    fn rows(&self) -> impl Iterator<Item = (usize, Vec<f64>)> + '_ {
+        (0..self.count).step_by(self.band).flat_map(move |first| {
+            let band = first..(first + self.band).min(self.count);
+            let sums = self.sums(band.clone());
+            band.clone().map(move |key| {
+                let row = &sums[(key - band.start) * self.count..][..self.count];
+                let area = self.areas[key];
+                // A key without elements has no area and no exchange.
+                let share = |s: &f64| if area > 0.0 { s / area } else { 0.0 };
+                (key, row.iter().map(share).collect())
+            })
+        })
+    }
+
+    /// Sums of S between the keys in `band` and every key.
+    fn sums(&self, band: Range<usize>) -> Vec<f64> {
+        let mut sums = vec![0.0; band.len() * self.count];
+        let mut add = |i: usize, j: usize, s: f64| {
+            if band.contains(&i) {
+                sums[(i - band.start) * self.count + j] += s;
+            }
+        };
+        for block in self.blocks {
+            let keys_of = |start: u32, count: u32| &self.keys[start as usize..(start + count) as usize];
+            let rows = keys_of(block.row_start, block.rows);
+            let columns = keys_of(block.column_start, block.columns);
+            if !rows.iter().chain(columns).any(|&key| band.contains(&(key as usize))) {
+                continue;
+            }
+            let triangle = block.kind() == Ok(BlockKind::Triangle);
+            let mut at = block.offset as usize;
+            for (r, &row) in rows.iter().enumerate() {
+                let first = if triangle { r } else { 0 };
+                for (c, &column) in columns.iter().enumerate().skip(first) {
+                    let s = self.values.get(at);
+                    at += 1;
+                    add(row as usize, column as usize, s);
+                    // The mirror image; an entry on the diagonal is its own.
+                    if !(triangle && r == c) {
+                        add(column as usize, row as usize, s);
+                    }
+                }
+            }
+        }
+        sums
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// However few rows are made at a time, the table is the same.
+    #[test]
+    fn bands_make_no_difference() {
+        let blocks = [
+            Block::new(BlockKind::Triangle, 0..2, 0..2, 0),
+            Block::new(BlockKind::Dense, 0..2, 3..5, 3),
+            Block::new(BlockKind::Triangle, 2..5, 2..5, 7),
+        ];
+        let values: Vec<f64> = (1..=13).map(f64::from).collect();
+        let keys = [2, 0, 1, 2, 0];
+        let table = |band: usize| -> Vec<(usize, Vec<f64>)> {
+            let values = Values::F64(&values);
+            let areas = vec![1.0, 2.0, 4.0, 0.0];
+            Factors { blocks: &blocks, values, keys: &keys, areas, count: 4, band }.rows().collect()
+        };
+        let whole = table(4);
+        // S between key 0 (elements 1 and 4) and itself: S_11 + 2 S_14 + S_44 = 3 + 2 * 7 + 13.
+        assert_eq!(whole[0].1[0], 30.0);
+        // Keys 1 (element 2) and 2 (elements 0 and 3): S_23 = 9, and S_02 is absent.
+        assert_eq!((whole[1].1[2], whole[2].1[1]), (9.0 / 2.0, 9.0 / 4.0));
+        assert_eq!(whole[3].1, [0.0; 4]);
+        assert_eq!(table(1), whole);
+        assert_eq!(table(3), whole);
+    }
+}

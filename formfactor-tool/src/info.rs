@@ -1,0 +1,127 @@
+//! `formfactor-tool info`: what a matrix file holds, for people and as JSON.
+
+use interchange::error::Result;
+use interchange::matrix::{Matrix, Precision};
+use interchange::report::Report;
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::path::Path;
+
+/// Describes the matrix at `path`; with the counters of the report beside it, where there is one.
+pub fn describe(path: &Path, as_json: bool) -> Result<String> {
+    let matrix = Matrix::open(path)?;
+    let record = matrix.record();
+    let elements = matrix.element_count();
+    let stored = matrix.values()?.len() as u64;
+    // The half that is stored: the upper triangle with the diagonal.
+    let half = elements as u64 * (elements as u64 + 1) / 2;
+    let absent_share = 1.0 - stored as f64 / half as f64;
+    let sums = matrix.row_sums()?;
+    let row_sums = Spread::of(&sums);
+    let row_errors = Spread::of(matrix.row_errors()?);
+    let precision = match record.precision {
+        Precision::F32 => "f32",
+        Precision::F64 => "f64",
+    };
+    let defect = (1.0 - row_sums.least).max(row_sums.largest - 1.0);
+    // A row sum within its own estimated error of 1 loses nothing that could be told from error.
+    let closed = sums.iter().zip(matrix.row_errors()?).all(|(sum, error)| (1.0 - sum).abs() <= *error);
+    let provenance = matrix.provenance();
+    let inputs: serde_json::Map<String, Value> =
+        provenance.inputs.iter().map(|i| (i.role.clone(), json!(i.digest.to_string()))).collect();
+    let report = read_report(path);
+
+    if as_json {
+        let data = json!({
+            "kind": "matrix",
+            "digest": matrix.digest().to_string(),
+            "bytes": matrix.length(),
+            "elements": elements,
+            "blocks": matrix.blocks()?.len(),
+            "stored_entries": stored,
+            "absent_share": absent_share,
+            "precision": precision,
+            "symmetric": record.symmetric,
+            "extended": record.extended,
+            "part": record.part,
+            "parts": record.parts,
+            "tolerance": record.tolerance,
+            "row_errors": row_errors.json(),
+            "row_sums": row_sums.json(),
+            "largest_row_sum_defect": defect,
+            "closed": closed,
+            "mesh": record.mesh.to_string(),
+            "tool": provenance.tool,
+            "version": provenance.version,
+            "flags": provenance.flags,
+            "inputs": inputs,
+            "report": report,
+        });
+        return Ok(format!("{data:#}\n"));
+    }
+
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    let mut line = |name: &str, value: String| {
+        let _ = writeln!(text, "{name:<12} {value}");
+    };
+    line("matrix", format!("{} ({})", path.display(), matrix.digest().short()));
+    line("elements", elements.to_string());
+    line(
+        "stored",
+        format!(
+            "{stored} entries ({precision}) in {} blocks, {} bytes; {:.1} % of the pairs are absent (zero)",
+            matrix.blocks()?.len(),
+            matrix.length(),
+            100.0 * absent_share
+        ),
+    );
+    if record.parts != 1 {
+        line("part", format!("{} of {}", record.part + 1, record.parts));
+    }
+    line("tolerance", format!("{:e} asked per row", record.tolerance));
+    line("row errors", row_errors.text());
+    line("row sums", row_sums.text());
+    let scene = match closed {
+        true => "closed: every row sum is 1 within its error".to_owned(),
+        false => format!("open, or inexact: row sums differ from 1 by up to {defect:.3e}"),
+    };
+    line("scene", scene);
+    if let Some(counters) = report.as_ref().and_then(|r| r["counters"].as_object()) {
+        counters.iter().for_each(|(name, count)| line("", format!("{name}: {count}")));
+    }
+    line("made by", format!("{} {} {}", provenance.tool, provenance.version, provenance.flags.join(" ")));
+    line("mesh", record.mesh.short());
+    Ok(text)
+}
+
+/// Least, mean and largest value.
+struct Spread {
+    least: f64,
+    mean: f64,
+    largest: f64,
+}
+
+impl Spread {
+    fn of(values: &[f64]) -> Self {
+        Self {
+            least: values.iter().copied().fold(f64::INFINITY, f64::min),
+            mean: values.iter().sum::<f64>() / values.len().max(1) as f64,
+            largest: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        }
+    }
+
+    fn json(&self) -> Value {
+        json!({ "least": self.least, "mean": self.mean, "largest": self.largest })
+    }
+
+    fn text(&self) -> String {
+        format!("{:.6e} least, {:.6e} mean, {:.6e} largest", self.least, self.mean, self.largest)
+    }
+}
+
+/// The report beside the file, if it is there and can be read.
+fn read_report(path: &Path) -> Option<Value> {
+    let text = std::fs::read_to_string(Report::path_for(path)).ok()?;
+    serde_json::from_str(&text).ok()
+}

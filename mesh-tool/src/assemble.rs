@@ -1,0 +1,145 @@
+//! The mesh put together from the patches of all layers: vertices, elements in cluster order, nodes, lines.
+
+use crate::clean::Cleaned;
+use crate::cluster;
+use crate::contact::Pieces;
+use crate::nodes::{self, Element};
+use crate::patch::Patch;
+use crate::sheets::Layer;
+use geometry::polygon;
+use glam::DVec3;
+use interchange::ids::{FaceId, VertexId};
+use interchange::mesh::{FACE_EMITS, FACE_TWO_SIDED, Line, Mesh};
+use interchange::ragged::Ragged;
+use interchange::scene::Scene;
+use std::collections::HashMap;
+
+/// Puts the mesh together. With `six_nodes` every edge gets a node in its middle.
+pub fn assemble(
+    scene: &Scene,
+    cleaned: Cleaned,
+    pieces: &Pieces,
+    patches: &[(&Layer, Patch)],
+    six_nodes: bool,
+) -> Mesh {
+    let Cleaned { mut places, faces } = cleaned;
+    let diagonal = polygon::diameter(places.positions());
+    let centre = polygon::mean_corner(places.positions());
+    let (mut elements, mut lines) = (Vec::new(), Vec::new());
+    for (number, (layer, patch)) in patches.iter().enumerate() {
+        let vertices: Vec<u32> =
+            patch.points.iter().map(|p| p.place.unwrap_or_else(|| places.insert(p.position))).collect();
+        for element in &patch.elements {
+            let sheet = &layer.sheets[element.sheet as usize];
+            let mut corners: Vec<u32> = element.corners.iter().map(|&p| vertices[p as usize]).collect();
+            let mut seams = element.seams.clone();
+            if layer.reversed {
+                // The edge after the last corner stays the last one.
+                corners.reverse();
+                let n = seams.len();
+                seams[..n - 1].reverse();
+            }
+            let surface = (number as u32, sheet.material);
+            elements.push(Element { corners, seams, face: sheet.face, side: sheet.side, surface });
+        }
+        lines.extend(patch.lines.iter().map(|line| Line {
+            from: VertexId(vertices[line.from as usize]),
+            to: VertexId(vertices[line.to as usize]),
+            face: FaceId(layer.sheets[line.sheet as usize].face),
+            order: 0,
+            source: FaceId(line.source),
+        }));
+    }
+
+    // Number the elements in cluster order.
+    let corners: Vec<Vec<DVec3>> = elements.iter().map(|element| places.corners(&element.corners)).collect();
+    let (order, clusters) = cluster::order(&corners, centre, diagonal);
+    let elements: Vec<Element> = order.iter().map(|&old| elements[old].clone()).collect();
+
+    // Vertices that only cleaned-away corners used would be noise: number those in use, in order of use.
+    let mut vertices = Vertices { places: places.positions(), number: HashMap::new(), positions: Vec::new() };
+    let face_corners: Ragged<VertexId> =
+        faces.iter().map(|face| vertices.of(&face.corners)).collect::<Vec<_>>().into_iter().collect();
+    let occluders: Vec<(u32, Vec<VertexId>)> = pieces
+        .iter()
+        .enumerate()
+        .flat_map(|(face, pieces)| pieces.iter().map(move |piece| (face as u32, piece)))
+        .map(|(face, piece)| (face, vertices.of(piece)))
+        .collect();
+    let elements: Vec<Element> = elements
+        .into_iter()
+        .map(|e| Element { corners: vertices.of(&e.corners).iter().map(|v| v.0).collect(), ..e })
+        .collect();
+    for line in &mut lines {
+        (line.from, line.to) = (vertices.one(line.from.0), vertices.one(line.to.0));
+    }
+    let middles = six_nodes.then(|| middles(&elements, &mut vertices.positions));
+    let nodes = nodes::number(&elements, middles.as_deref());
+
+    Mesh {
+        vertices: vertices.positions.iter().map(DVec3::to_array).collect(),
+        elements: elements.iter().map(|e| e.corners.iter().copied().map(VertexId).collect()).collect(),
+        element_nodes: nodes.of_elements,
+        element_faces: elements.iter().map(|e| FaceId(e.face)).collect(),
+        element_sides: elements.iter().map(|e| e.side).collect(),
+        node_vertices: nodes.vertices,
+        faces: face_corners,
+        face_inputs: faces.iter().map(|face| face.input).collect(),
+        face_groups: faces.iter().map(|face| face.group).collect(),
+        face_materials: faces.iter().map(|face| face.material).collect(),
+        face_flags: faces
+            .iter()
+            .map(|face| {
+                (if face.emits { FACE_EMITS } else { 0 }) | (if face.two_sided { FACE_TWO_SIDED } else { 0 })
+            })
+            .collect(),
+        occluder_faces: occluders.iter().map(|(face, _)| FaceId(*face)).collect(),
+        // Faces may overlap in their plane and cross each other: as blockers they do no harm, and the fewer the better.
+        occluders: occluders.into_iter().map(|(_, corners)| corners).collect(),
+        lines,
+        clusters,
+        groups: scene.groups.clone(),
+        materials: scene.materials.names.clone(),
+        input_face_count: scene.faces.len() as u32,
+    }
+}
+
+/// Vertices of the mesh, numbered when first used.
+struct Vertices<'a> {
+    places: &'a [DVec3],
+    number: HashMap<u32, VertexId>,
+    positions: Vec<DVec3>,
+}
+
+impl Vertices<'_> {
+    fn one(&mut self, place: u32) -> VertexId {
+        *self.number.entry(place).or_insert_with(|| {
+            self.positions.push(self.places[place as usize]);
+            VertexId::new(self.positions.len() - 1)
+        })
+    }
+
+    fn of(&mut self, places: &[u32]) -> Vec<VertexId> {
+        places.iter().map(|&place| self.one(place)).collect()
+    }
+}
+
+/// A vertex in the middle of each edge, one for all elements that share the edge.
+fn middles(elements: &[Element], positions: &mut Vec<DVec3>) -> Vec<Vec<u32>> {
+    let mut known: HashMap<(u32, u32), u32> = HashMap::new();
+    elements
+        .iter()
+        .map(|element| {
+            let n = element.corners.len();
+            (0..n)
+                .map(|k| {
+                    let (a, b) = (element.corners[k], element.corners[(k + 1) % n]);
+                    *known.entry((a.min(b), a.max(b))).or_insert_with(|| {
+                        positions.push(0.5 * (positions[a as usize] + positions[b as usize]));
+                        positions.len() as u32 - 1
+                    })
+                })
+                .collect()
+        })
+        .collect()
+}

@@ -1,0 +1,236 @@
+//! `mesh-tool info`: what is in a mesh or a material table, on a page a person reads in ten seconds, or as JSON.
+
+use crate::build::Quality;
+use crate::sheets;
+use geometry::polygon;
+use glam::DVec3;
+use interchange::Result;
+use interchange::digest::Digest;
+use interchange::ids::GroupId;
+use interchange::materials::MaterialTable;
+use interchange::mesh::{FACE_EMITS, Mesh};
+use interchange::provenance::Provenance;
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use std::io::Read as _;
+use std::path::Path;
+
+/// Describes the file at `path`.
+pub fn describe(path: &Path, as_json: bool) -> Result<String> {
+    // The magic tells the kind; whatever is neither is refused by the mesh reader, which names what it found.
+    let mut magic = [0; 4];
+    let is_table = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok()
+        && &magic[1..] == b"MAT";
+    if is_table {
+        let (table, provenance, digest) = MaterialTable::read(path)?;
+        Ok(if as_json {
+            materials_json(&table, &provenance, digest)
+        } else {
+            materials_page(path, &table, &provenance, digest)
+        })
+    } else {
+        let (mesh, provenance, digest) = Mesh::read(path)?;
+        Ok(if as_json {
+            mesh_json(&mesh, &provenance, digest)
+        } else {
+            mesh_page(path, &mesh, &provenance, digest)
+        })
+    }
+}
+
+/// Elements, area and material of one group.
+struct Group<'a> {
+    name: &'a str,
+    faces: usize,
+    elements: usize,
+    area: f64,
+    materials: Vec<&'a str>,
+}
+
+fn groups(mesh: &Mesh) -> Vec<Group<'_>> {
+    let mut groups: Vec<Group> = mesh
+        .groups
+        .iter()
+        .map(|name| Group { name, faces: 0, elements: 0, area: 0.0, materials: Vec::new() })
+        .collect();
+    for (GroupId(group), material) in mesh.face_groups.iter().zip(&mesh.face_materials) {
+        let group = &mut groups[*group as usize];
+        let name = mesh.materials[material.index()].as_str();
+        group.faces += 1;
+        if !group.materials.contains(&name) {
+            group.materials.push(name);
+        }
+    }
+    for element in mesh.element_ids() {
+        let group = &mut groups[mesh.element_group(element).index()];
+        group.elements += 1;
+        group.area += polygon::area(&mesh.element_corners(element));
+    }
+    groups
+}
+
+fn emitter_count(mesh: &Mesh) -> usize {
+    mesh.element_ids().filter(|&e| mesh.face_flags[mesh.element_face(e).index()] & FACE_EMITS != 0).count()
+}
+
+/// Lower and upper corner of the vertices.
+fn bounds(mesh: &Mesh) -> ([f64; 3], [f64; 3]) {
+    let positions: Vec<DVec3> = mesh.vertices.iter().copied().map(DVec3::from_array).collect();
+    let (low, high) = sheets::bounds(&positions);
+    (low.to_array(), high.to_array())
+}
+
+fn origin_lines(page: &mut String, provenance: &Provenance, digest: Digest) {
+    let flags = if provenance.flags.is_empty() { "no flags".into() } else { provenance.flags.join(" ") };
+    let _ = writeln!(page, "made by    {} {}, {flags}", provenance.tool, provenance.version);
+    for input in &provenance.inputs {
+        let _ = writeln!(page, "from       {} {}", input.role, input.digest.short());
+    }
+    let _ = writeln!(page, "identity   {}", digest.short());
+}
+
+fn mesh_page(path: &Path, mesh: &Mesh, provenance: &Provenance, digest: Digest) -> String {
+    let mut page = String::new();
+    let quality = Quality::of(mesh);
+    let six = mesh.element_nodes.rows().zip(mesh.elements.rows()).all(|(n, c)| n.len() == 2 * c.len());
+    let (low, high) = bounds(mesh);
+    let _ = writeln!(page, "{}: mesh", path.display());
+    origin_lines(&mut page, provenance, digest);
+    let _ = writeln!(
+        page,
+        "elements   {} ({} emit), {}",
+        mesh.element_count(),
+        emitter_count(mesh),
+        if six { "six-node triangles" } else { "faces as given" }
+    );
+    let _ = writeln!(page, "nodes      {} at {} vertices", mesh.node_vertices.len(), mesh.vertices.len());
+    let _ = writeln!(
+        page,
+        "faces      {} of {} in the scene, {} convex pieces block light",
+        mesh.face_count(),
+        mesh.input_face_count,
+        mesh.occluders.len()
+    );
+    let _ = writeln!(page, "lines      {} edges on contact lines (D0)", mesh.lines.len());
+    let _ = writeln!(
+        page,
+        "clusters   {}, {} leaves",
+        mesh.clusters.len(),
+        mesh.clusters.iter().filter(|cluster| cluster.is_leaf()).count()
+    );
+    let _ = writeln!(page, "extent     {low:?} to {high:?}");
+    let _ = writeln!(
+        page,
+        "area       {:.6e} of elements, {:.6e} of faces",
+        quality.element_area, quality.face_area
+    );
+    let _ = writeln!(
+        page,
+        "shape      longest edge {:.4e}, smallest angle {:.1} deg (median {:.1})",
+        quality.longest_edge, quality.smallest_angle_deg, quality.median_smallest_angle_deg
+    );
+    let groups = groups(mesh);
+    let width = groups.iter().map(|g| g.name.chars().count()).max().unwrap_or(5).clamp(5, 40);
+    let _ = writeln!(page, "\n{:<width$}  faces  elements          area  materials", "group");
+    const SHOWN: usize = 40;
+    for group in groups.iter().take(SHOWN) {
+        let _ = writeln!(
+            page,
+            "{:<width$}  {:>5}  {:>8}  {:>12.5e}  {}",
+            group.name,
+            group.faces,
+            group.elements,
+            group.area,
+            group.materials.join(" ")
+        );
+    }
+    if groups.len() > SHOWN {
+        let _ = writeln!(page, "... and {} groups more (--json lists all)", groups.len() - SHOWN);
+    }
+    page
+}
+
+fn materials_page(path: &Path, table: &MaterialTable, provenance: &Provenance, digest: Digest) -> String {
+    let mut page = format!("{}: material table\n", path.display());
+    origin_lines(&mut page, provenance, digest);
+    let width = table.names.iter().map(|name| name.chars().count()).max().unwrap_or(8).clamp(8, 40);
+    let triple = |v: [f64; 3]| v.map(|x| format!("{x:.4}")).join(" ");
+    let _ = writeln!(page, "\n{:<width$}  sides  {:<22}  radiance", "material", "reflectance");
+    for (name, m) in table.names.iter().zip(&table.values) {
+        let sides = if m.is_two_sided() { 2 } else { 1 };
+        let light = if m.emits() { triple(m.radiance) } else { "-".into() };
+        let _ = writeln!(page, "{name:<width$}  {sides:>5}  {:<22}  {light}", triple(m.diffuse));
+    }
+    page
+}
+
+fn origin_json(provenance: &Provenance, digest: Digest) -> Value {
+    let inputs: Vec<Value> = provenance
+        .inputs
+        .iter()
+        .map(|input| json!({"role": input.role, "digest": input.digest.to_string()}))
+        .collect();
+    json!({
+        "tool": provenance.tool,
+        "version": provenance.version,
+        "flags": provenance.flags,
+        "inputs": inputs,
+        "identity": digest.to_string(),
+    })
+}
+
+fn mesh_json(mesh: &Mesh, provenance: &Provenance, digest: Digest) -> String {
+    let quality = Quality::of(mesh);
+    let (low, high) = bounds(mesh);
+    let groups: Vec<Value> = groups(mesh)
+        .iter()
+        .map(|g| {
+            json!({"name": g.name, "faces": g.faces, "elements": g.elements, "area": g.area, "materials": g.materials})
+        })
+        .collect();
+    let value = json!({
+        "kind": "mesh",
+        "provenance": origin_json(provenance, digest),
+        "elements": mesh.element_count(),
+        "emitting_elements": emitter_count(mesh),
+        "vertices": mesh.vertices.len(),
+        "nodes": mesh.node_vertices.len(),
+        "faces": mesh.face_count(),
+        "input_faces": mesh.input_face_count,
+        "occluders": mesh.occluders.len(),
+        "lines": mesh.lines.len(),
+        "clusters": mesh.clusters.len(),
+        "low": low,
+        "high": high,
+        "element_area": quality.element_area,
+        "face_area": quality.face_area,
+        "longest_edge": quality.longest_edge,
+        "smallest_angle_deg": quality.smallest_angle_deg,
+        "median_smallest_angle_deg": quality.median_smallest_angle_deg,
+        "materials": mesh.materials,
+        "groups": groups,
+    });
+    format!("{value:#}\n")
+}
+
+fn materials_json(table: &MaterialTable, provenance: &Provenance, digest: Digest) -> String {
+    let materials: Vec<Value> = table
+        .names
+        .iter()
+        .zip(&table.values)
+        .map(|(name, m)| {
+            json!({
+                "name": name, "diffuse": m.diffuse, "radiance": m.radiance, "specular": m.specular,
+                "transmission": m.transmission, "exponent": m.exponent, "refraction": m.refraction,
+                "opacity": m.opacity, "roughness": m.roughness, "metalness": m.metalness,
+                "two_sided": m.is_two_sided(),
+            })
+        })
+        .collect();
+    let value = json!({
+        "kind": "materials",
+        "provenance": origin_json(provenance, digest),
+        "materials": materials,
+    });
+    format!("{value:#}\n")
+}

@@ -1,0 +1,224 @@
+# The radiosity pipeline: scene.obj -> .materials, .mesh -> .ff -> .sol -> .exr and .png
+#
+#   make -f pipeline.mk                                   the Cornell box, into out/
+#   make -f pipeline.mk SCENE=path/name.obj OUT=folder    your scene, into folder/name.*
+#   make -f pipeline.mk ERROR=0.01                        a finer picture
+#   make -f pipeline.mk test                              the tests
+#   make -f pipeline.mk clean SCENE=... OUT=...           removes what was made for this scene
+#
+# Only what an edit touches runs again: a changed colour reruns solving and shading, a moved camera shading alone.
+# Every tool leaves a file alone that it would write with the same bytes; a stage runs when a file it reads, its flags
+# or its program is newer than its own last run. For each stage with output F there are
+#
+#   F.made    the stamp of its last run (its time is the start of that run), which depends on what the stage reads;
+#   F         which depends on F.made with an empty recipe, so that make looks at F again after the stage and sees
+#             whether it changed. F may be older than F.made. Later stages depend on F, so an unchanged F ends it there
+#             (The empty recipe is written +: with a bare one, make -n and make -q take F for new.)
+#   F.flags   the stage's program and flags as text, rewritten only where that text changed.
+#
+# A missing F, or a missing input, makes the stage run by way of FORCE. Only `clean` deletes anything.
+
+ifeq ($(filter grouped-target,$(.FEATURES)),)
+$(error pipeline.mk needs GNU make 4.3 or newer, this is $(MAKE_VERSION))
+endif
+.SUFFIXES:
+.DEFAULT_GOAL := all
+
+# ---- What a user sets ----------------------------------------------------------------------------------------------
+
+# Folder of this file, ending in a slash, or nothing. Paths a user gives are relative to where make was called.
+ROOT := $(patsubst ./%,%,$(dir $(lastword $(MAKEFILE_LIST))))
+BIN  := $(or $(CARGO_TARGET_DIR),$(ROOT)target)/release/
+
+SCENE ?= $(ROOT)tests/scenes/cornell_blocks.obj
+OUT   ?= out
+# Wished relative RMS error of the picture: mesh fineness and the stages' tolerances follow from it, see below.
+ERROR ?= 0.02
+# 1: a stage that misses its tolerance (exit 3) stops the pipeline. Otherwise it warns and the pipeline goes on.
+STRICT ?=
+# Added to a stage's command. A flag given here replaces the one that follows from ERROR.
+MESH_FLAGS  ?=
+FF_FLAGS    ?=
+SOLVE_FLAGS ?=
+SHADE_FLAGS ?=
+# A stage's program. Any other with the same command line will do; the ones named here are built first.
+MESH_TOOL       ?= $(BIN)mesh-tool
+FORMFACTOR_TOOL ?= $(BIN)formfactor-tool
+SOLVE_TOOL      ?= $(BIN)solve-tool
+SHADE_TOOL      ?= $(BIN)shade-tool
+
+# ---- ERROR -> mesh fineness and tolerances -------------------------------------------------------------------------
+
+# The mesh decides the picture's error, about 30 / elements on plain rooms; matrix and solution are asked to be twenty
+# times better than the picture. This awk text is the whole calibration; e is ERROR.
+define CALIBRATION
+elements = 30 / e;
+if (elements < 200) elements = 200;
+if (elements > 20000) elements = 20000;
+ff_tolerance = e / 20;
+solve_tolerance = e / 20;
+endef
+
+quote := '
+quoted = $(quote)$(subst $(quote),$(quote)\$(quote)$(quote),$(strip $1))$(quote)
+derived := $(shell LC_ALL=C awk -v given=$(call quoted,$(ERROR)) 'BEGIN { e = given + 0; \
+  if (given !~ /^[0-9]*[.]?[0-9]+([eE][-+]?[0-9]+)?$$/ || e <= 0 || e > 1) exit; \
+  $(CALIBRATION) printf "%d %.6g %.6g", elements + 0.5, ff_tolerance, solve_tolerance }')
+ifneq ($(words $(derived)),3)
+$(error pipeline.mk: ERROR = $(ERROR): expected a number above 0 and at most 1, such as 0.02)
+endif
+
+# $(call unless,FLAGS,--a --b,DERIVED): DERIVED, unless FLAGS already say --a or --b.
+unless = $(if $(filter $2 $(2:%=%=%),$1),,$3)
+mesh_flags  = $(call unless,$(MESH_FLAGS),--elements --max-edge,--elements $(word 1,$(derived))) $(MESH_FLAGS)
+ff_flags    = $(call unless,$(FF_FLAGS),--tolerance,--tolerance $(word 2,$(derived))) $(FF_FLAGS)
+solve_flags = $(call unless,$(SOLVE_FLAGS),--tolerance,--tolerance $(word 3,$(derived))) $(SOLVE_FLAGS)
+
+# The camera is the scene's toml where that has one; otherwise shade-tool frames the scene itself.
+TOML := $(wildcard $(basename $(SCENE)).toml)
+camera      := $(if $(TOML),$(shell grep -Eq '^[[:space:]]*(\[+[[:space:]]*)?camera' $(TOML) && echo --camera $(TOML)))
+shade_flags  = $(call unless,$(SHADE_FLAGS),--camera,$(camera)) $(SHADE_FLAGS)
+
+# ---- Paths make cannot handle are refused before anything runs -----------------------------------------------------
+
+open := (
+shut := )
+backslash := $(strip \)
+empty :=
+space := $(empty) $(empty)
+awkward := $(open) $(shut) $(backslash) $(quote) : % & ; < > | * ? [ ] ! " `
+bad-path = $(or $(filter-out 1,$(words $2)),$(strip $(foreach c,$(awkward),$(findstring $c,$2))))
+checked-path = $(if $(call bad-path,$1,$2),$(error pipeline.mk: $1 = "$2": a path here is one word of letters, \
+  digits and . _ - + / because make splits names at spaces; rename it, or link it under a plain name))
+ifeq ($(wildcard $(lastword $(MAKEFILE_LIST))),)
+$(error pipeline.mk: the path of this file holds a space; change to its folder and run "make -f pipeline.mk" there)
+endif
+$(call checked-path,SCENE,$(SCENE))
+$(call checked-path,OUT,$(OUT))
+ifeq ($(filter %.obj %.OBJ,$(SCENE)),)
+$(error pipeline.mk: SCENE = $(SCENE): expected the path of an .obj file)
+endif
+
+# ---- What a stage depends on ---------------------------------------------------------------------------------------
+
+# All outputs begin with this.
+P := $(patsubst %/,%,$(strip $(OUT)))/$(basename $(notdir $(SCENE)))
+
+# Inputs a user can take away: a missing one is left to the tool, whose message names the nearest file.
+inputs  = $(foreach f,$1,$(if $(wildcard $f),$f,FORCE))
+# Outputs: FORCE where one of them is missing, or where STRICT asks again what once went through with exit 3.
+missing = $(if $(filter-out $(wildcard $1),$1),FORCE)
+strict := $(filter-out 0 no,$(STRICT))
+again   = $(call missing,$1) $(if $(strict),$(if $(filter 3,$(file <$(firstword $1).made)),FORCE))
+# Files that flags name, such as another camera: not folders, not this pipeline's own outputs.
+named   = $(foreach f,$(filter-out $(P).%,$(wildcard $(subst =, ,$1))),$(if $(wildcard $f/.),,$f))
+# The files of a program: where the shell finds its first word, and further words that are files (python3 my_tool.py).
+# `clean` and `test` need none of it.
+tools   := mesh-tool formfactor-tool solve-tool shade-tool
+built   := $(tools:%=$(BIN)%)
+running := $(filter-out clean test,$(or $(MAKECMDGOALS),all))
+find-program = $(or $(wildcard $(shell command -v $(firstword $2))),$(error pipeline.mk: $1 = "$2": no such program))
+program = $(if $(running),$(if $(filter $(built),$($1)),$($1),\
+  $(call find-program,$1,$($1)) $(call named,$(wordlist 2,99,$($1)))))
+
+# Programs and flags as text. The scene's own path is part of it: another scene of the same name is another scene.
+program-text = $(patsubst $(BIN)%,%,$1)
+text.materials = $(call program-text,$(MESH_TOOL)) $(abspath $(SCENE)) $(notdir $(TOML))
+text.mesh = $(call program-text,$(MESH_TOOL)) $(abspath $(SCENE)) $(mesh_flags)
+text.ff   = $(call program-text,$(FORMFACTOR_TOOL)) $(ff_flags)
+text.sol  = $(call program-text,$(SOLVE_TOOL)) $(solve_flags)
+text.exr  = $(call program-text,$(SHADE_TOOL)) $(subst $(TOML),$(abspath $(TOML)),$(shade_flags))
+
+# ---- How a stage runs: the one place that knows exit codes -----------------------------------------------------------
+
+# $(call stage,COMMAND) says and runs COMMAND, then stamps $@ with the time the run began, so that an input edited
+# meanwhile counts as newer. Exit 3 (written, tolerance missed) warns, or with STRICT stops; in both cases the output is
+# kept. Any other failure stops without a stamp; the tool has left the old output as it was.
+silent := $(findstring s,$(firstword -$(MAKEFLAGS)))
+define stage
+@: > $@.start
+$(if $(silent),,@printf '%s\n' $(call quoted,$1))
+@$(strip $1); code=$$?; case $$code:$(strict) in \
+0:*) ;; \
+3:) echo "pipeline.mk: warning: $(@:.made=): the asked tolerance was not reached; going on (STRICT=1 stops)" >&2 ;; \
+3:*) echo "pipeline.mk: $(@:.made=): the asked tolerance was not reached; kept, stopping (STRICT)" >&2; exit 3 ;; \
+*) exit $$code ;; \
+esac; \
+echo $$code > $@.new && touch -r $@.start $@.new && mv -f $@.new $@ && rm -f $@.start
+endef
+
+# ---- The stages ------------------------------------------------------------------------------------------------------
+
+.PHONY: all test clean FORCE
+all: $(P).exr $(P).png
+FORCE:
+
+# Materials: colours, powers, and .surfaces, the little that geometry depends on. The depfile lists the MTL files.
+materials_outputs := $(P).materials $(P).surfaces $(P).materials.d
+listed := $(filter-out %: $(backslash),$(subst $(backslash)$(space),?,$(file <$(P).materials.d)))
+$(P).materials.made: $(sort $(call inputs,$(SCENE) $(listed))) $(TOML) $(P).materials.flags \
+    $(call program,MESH_TOOL) $(call again,$(materials_outputs))
+	$(call stage,$(MESH_TOOL) materials $(SCENE) -o $(P).materials --depfile $(P).materials.d)
+$(materials_outputs): $(P).materials.made ; +
+
+# Mesh: the scene's faces cut into elements. Depends on .surfaces and not on the MTL, so colours leave it alone.
+$(P).mesh.made: $(call inputs,$(SCENE)) $(P).surfaces $(P).mesh.flags $(call named,$(MESH_FLAGS)) \
+    $(call program,MESH_TOOL) $(call again,$(P).mesh)
+	$(call stage,$(MESH_TOOL) build $(SCENE) -o $(P).mesh $(mesh_flags))
+$(P).mesh: $(P).mesh.made ; +
+
+# Form factors: what every element sees of every other.
+$(P).ff.made: $(P).mesh $(P).ff.flags $(call named,$(FF_FLAGS)) \
+    $(call program,FORMFACTOR_TOOL) $(call again,$(P).ff)
+	$(call stage,$(FORMFACTOR_TOOL) compute $(P).mesh -o $(P).ff $(ff_flags))
+$(P).ff: $(P).ff.made ; +
+
+# Solution: radiosity and irradiance of every element, with the materials beside the mesh.
+$(P).sol.made: $(P).ff $(P).mesh $(P).materials $(P).sol.flags $(call named,$(SOLVE_FLAGS)) \
+    $(call program,SOLVE_TOOL) $(call again,$(P).sol)
+	$(call stage,$(SOLVE_TOOL) solve $(P).ff --mesh $(P).mesh -o $(P).sol $(solve_flags))
+$(P).sol: $(P).sol.made ; +
+
+# Pictures: linear radiance as EXR, a preview as PNG.
+$(P).exr.made: $(P).sol $(P).mesh $(P).materials $(TOML) $(P).exr.flags $(call named,$(SHADE_FLAGS)) \
+    $(call program,SHADE_TOOL) $(call again,$(P).exr $(P).png)
+	$(call stage,$(SHADE_TOOL) render $(P).sol --mesh $(P).mesh -o $(P).exr --png $(P).png $(shade_flags))
+$(P).exr $(P).png: $(P).exr.made ; +
+
+# Flags: written first, and only where the text is another one (or the file is missing).
+stages := materials mesh ff sol exr
+same    = $(and $(findstring <$(strip $1)>,<$(strip $2)>),$(findstring <$(strip $2)>,<$(strip $1)>))
+$(foreach s,$(stages),$(if $(call same,$(text.$s),$(file <$(P).$s.flags)),,$(P).$s.flags)): FORCE
+$(stages:%=$(P).%.flags): $(P).%.flags:
+	@mkdir -p $(@D)
+	@printf '%s\n' $(call quoted,$(text.$*)) > $@
+
+# ---- Building, testing, cleaning ---------------------------------------------------------------------------------------
+
+cargo = @command -v cargo > /dev/null || { echo "pipeline.mk: cargo not found: install Rust (https://rustup.rs)" >&2; exit 1; }
+
+# The tools, where a stage uses ours: cargo is asked when a source is newer than the last time, and leaves a program
+# alone that did not change. MAKEFLAGS is kept from cargo, which would take make's job slots for its own.
+ifneq ($(and $(running),$(filter $(built),$(MESH_TOOL) $(FORMFACTOR_TOOL) $(SOLVE_TOOL) $(SHADE_TOOL))),)
+rooms := $(addprefix $(ROOT),interchange geometry $(tools))
+sources := $(wildcard $(ROOT)Cargo.toml $(ROOT)Cargo.lock $(rooms:%=%/Cargo.toml)) $(shell find $(rooms:%=%/src))
+$(BIN)pipeline.made: $(sources) $(call missing,$(built))
+	$(cargo)
+	@mkdir -p $(@D) && : > $@.start
+	MAKEFLAGS= cargo build --release --workspace --manifest-path $(ROOT)Cargo.toml
+	@mv -f $@.start $@
+$(built): $(BIN)pipeline.made ; +
+endif
+
+# All tests, numbers included.
+test:
+	$(cargo)
+	MAKEFLAGS= cargo test --release --workspace --manifest-path $(ROOT)Cargo.toml
+
+# Removes what the stages made for this scene, and what a killed stage left half written; nothing else in the folder.
+outputs := $(materials_outputs) $(P).mesh $(P).ff $(P).sol $(P).exr $(P).png
+hidden  := $(dir $(P)).$(notdir $(P))
+clean:
+	rm -f $(outputs) $(outputs:%=%.report.json)
+	rm -f $(foreach s,$(stages),$(addprefix $(P).$s,.flags .made .made.start .made.new))
+	rm -f $(foreach f,$(outputs:$(P)%=$(hidden)%),$f.*.partial $f.report.json.*.partial $f.*.mode)

@@ -1,0 +1,56 @@
+//! What can keep a system from being solved.
+
+use crate::lossless::Lossless;
+
+/// Result of everything in this crate that solves.
+pub type Result<T> = std::result::Result<T, SolveError>;
+
+/// A system that has no solution, or none that can be had from these files.
+#[derive(Debug, thiserror::Error)]
+pub enum SolveError {
+    /// A file that cannot be used.
+    #[error(transparent)]
+    File(#[from] interchange::Error),
+    /// Light that can neither leave nor be absorbed.
+    #[error("{0}")]
+    Lossless(Lossless),
+    /// A matrix whose rows gain more than the surfaces absorb.
+    #[error(
+        "the system is not positive definite in the {channel} channel: somewhere the rows of the matrix exceed 1 by \
+         more than the surfaces absorb; run formfactor-tool compute with a smaller --tolerance, or make the brightest \
+         materials darker"
+    )]
+    NotPositiveDefinite {
+        /// Name of the channel.
+        channel: &'static str,
+    },
+    /// A matrix in a form that this solver does not take.
+    #[error("{path}: {found}; {remedy}")]
+    Unsupported {
+        /// The matrix file.
+        path: String,
+        /// What it holds.
+        found: String,
+        /// What to do.
+        remedy: &'static str,
+    },
+    /// A direct solve that would not fit into memory.
+    #[error(
+        "--solver direct factors a dense matrix of {unknowns} unknowns, at most {most} are taken (its time grows with \
+         the third power); use --solver cg, which gives the same answer"
+    )]
+    TooManyUnknowns {
+        /// Rows with a reflectance above 0.
+        unknowns: usize,
+        /// Limit.
+        most: usize,
+    },
+    /// An emission beyond the range of f64.
+    #[error("material {material}: Ke {radiance:?} times pi is not a finite number; use other units")]
+    ExitanceTooLarge {
+        /// Name of the material.
+        material: String,
+        /// Its radiance.
+        radiance: [f64; 3],
+    },
+}

@@ -1,0 +1,95 @@
+//! What errors of the matrix do to the radiosity, and which matrix the asked error would need.
+//!
+//! If row i of F is off by e_i = sum over j of |dF_ij|, and S~ is symmetric like S, then
+//! |dK B| <= sum over i, j of rho_i |dS_ij| B_j <= rho_max sum over j of A_j e_j B_j, so that
+//!
+//!   |dB| / |B| <= |(I - K)^-1| rho_max e,   e = (sum A e B) / (sum A B)
+//!
+//! in the power norm: row error times rho / (1 - rho) where rho is uniform, as the furnace shows exactly.
+
+use crate::bound::Amplification;
+use crate::system::System;
+
+/// What the matrix's errors mean for one channel.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct MatrixError {
+    /// Estimated relative error of the radiosity in the power norm; infinite where there is no bound.
+    pub relative: f64,
+    /// Mean row error, weighted with the power that leaves each row.
+    pub row_error: f64,
+    /// |(I - K)^-1| rho_max: what a row error is multiplied with.
+    pub amplification: f64,
+}
+
+/// Effect of the matrix's row errors on the radiosity `radiosity` of a channel.
+pub fn matrix_error(
+    system: &System<'_>,
+    reflectance: &[f64],
+    radiosity: &[f64],
+    amplification: &Amplification,
+) -> MatrixError {
+    let (mut wrong, mut power) = (0.0, 0.0);
+    for (i, b) in radiosity.iter().enumerate() {
+        wrong += system.areas[i] * b.abs() * system.row_errors[i];
+        power += system.areas[i] * b.abs();
+    }
+    let brightest = reflectance.iter().copied().fold(0.0, f64::max);
+    let row_error = if power > 0.0 { wrong / power } else { 0.0 };
+    // A black scene amplifies nothing, whatever else is known.
+    let factor = if brightest > 0.0 { amplification.factor * brightest } else { 0.0 };
+    let relative = if row_error > 0.0 { factor * row_error } else { 0.0 };
+    MatrixError { relative, row_error, amplification: factor }
+}
+
+/// What to tell the user where the matrix is not good enough for the asked error: `asked` is solve-tool's
+/// tolerance, `matrix_tolerance` what the matrix was computed with. `None` where the matrix is good enough.
+pub fn shortfall(error: &MatrixError, asked: f64, matrix_tolerance: f64, channel: &str) -> Option<String> {
+    if error.relative <= asked {
+        return None;
+    }
+    let needed = rounded_down(asked / error.amplification);
+    let remedy = match needed > 0.0 {
+        true => format!(
+            "that needs a matrix with row errors of at most {needed:e}: formfactor-tool compute --tolerance {needed:e}, \
+             or a larger --tolerance here"
+        ),
+        false => "no matrix tolerance helps, because no bound below infinity could be proved".into(),
+    };
+    Some(format!(
+        "errors of the matrix may change the radiosity by {:.1e} in the {channel} channel (row errors {:.1e} times {:.3} \
+         by interreflection; the matrix was asked for {matrix_tolerance:e}), more than the asked {asked:e}; {remedy}",
+        error.relative, error.row_error, error.amplification
+    ))
+}
+
+/// The largest d * 10^k with one digit d that is not above `x`; 0 where there is none.
+fn rounded_down(x: f64) -> f64 {
+    if !(x > 0.0 && x.is_finite()) {
+        return 0.0;
+    }
+    let exponent = x.log10().floor() as i32;
+    // The text of a one-digit number reads back as the nearest double, which powi would miss.
+    let digit = (x / 10f64.powi(exponent)).floor().clamp(1.0, 9.0);
+    format!("{digit}e{exponent}").parse().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tolerances_are_rounded_down_to_one_digit() {
+        assert_eq!(rounded_down(2.7e-7), 2e-7);
+        assert_eq!(rounded_down(1e-8), 1e-8);
+        assert_eq!(rounded_down(0.0), 0.0);
+        assert_eq!(rounded_down(f64::INFINITY), 0.0);
+    }
+
+    #[test]
+    fn a_shortfall_names_the_tolerance_it_needs() {
+        let error = MatrixError { relative: 9.9e-3, row_error: 1e-4, amplification: 99.0 };
+        assert_eq!(shortfall(&error, 1e-2, 1e-4, "red"), None);
+        let text = shortfall(&error, 1e-6, 1e-4, "red").unwrap_or_default();
+        assert!(text.contains("formfactor-tool compute --tolerance 1e-8"), "{text}");
+    }
+}

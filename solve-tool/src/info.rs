@@ -1,0 +1,86 @@
+//! `solve-tool info`: what a solution file holds, for people and as JSON.
+
+use crate::channels::CHANNEL_NAMES;
+use interchange::report::Report;
+use interchange::solution::Solution;
+use serde_json::{Value, json};
+use std::fmt::Write;
+use std::path::Path;
+
+/// Describes the solution at `path`; with the report beside it, where there is one.
+pub fn describe(path: &Path, as_json: bool) -> interchange::Result<String> {
+    let (solution, provenance, origins, digest) = Solution::read(path)?;
+    let report = read_report(path);
+    let ranges: Vec<Value> = (0..3)
+        .map(|c| {
+            json!({
+                "channel": CHANNEL_NAMES[c],
+                "radiosity": range(&solution.radiosity, c),
+                "irradiance": range(&solution.irradiance, c),
+            })
+        })
+        .collect();
+    let summary = &solution.summary;
+    let inputs: serde_json::Map<String, Value> =
+        provenance.inputs.iter().map(|i| (i.role.clone(), json!(i.digest.to_string()))).collect();
+    let data = json!({
+        "kind": "solution",
+        "digest": digest.to_string(),
+        "elements": solution.radiosity.len(),
+        "solver": summary.solver,
+        "tolerance": summary.tolerance,
+        "achieved": summary.achieved,
+        "products": solution.history.len(),
+        "history": solution.history,
+        "channels": ranges,
+        "tool": provenance.tool,
+        "version": provenance.version,
+        "flags": provenance.flags,
+        "inputs": inputs,
+        "report": report,
+    });
+    if as_json {
+        return Ok(format!("{data:#}\n"));
+    }
+
+    let mut text = String::new();
+    // Writing to a string cannot fail.
+    let mut line = |name: &str, value: String| {
+        let _ = writeln!(text, "{name:<12} {value}");
+    };
+    line("solution", format!("{} ({})", path.display(), digest.short()));
+    line("elements", solution.radiosity.len().to_string());
+    line("solver", summary.solver.clone());
+    line("bound", format!("{:.2e} (asked {:e})", summary.achieved, summary.tolerance));
+    line("products", solution.history.len().to_string());
+    for (c, name) in CHANNEL_NAMES.iter().enumerate() {
+        let show = |r: [f64; 3]| format!("{:.6e} .. {:.6e}, mean {:.6e}", r[0], r[2], r[1]);
+        line(name, format!("B {}", show(range(&solution.radiosity, c))));
+        line("", format!("H {}", show(range(&solution.irradiance, c))));
+        let estimate =
+            |what: &str| report.as_ref().and_then(|r| r["estimates"][format!("{what} {name}")].as_f64());
+        if let (Some(emitted), Some(absorbed), Some(escaped)) =
+            (estimate("power emitted"), estimate("power absorbed"), estimate("power escaped"))
+        {
+            line("", format!("power {emitted:.6e} = absorbed {absorbed:.6e} + escaped {escaped:.6e}"));
+        }
+    }
+    line("made by", format!("{} {} {}", provenance.tool, provenance.version, provenance.flags.join(" ")));
+    let made_from = [("mesh", origins.mesh), ("matrix", origins.matrix), ("materials", origins.materials)];
+    made_from.iter().for_each(|(role, digest)| line(role, digest.short()));
+    Ok(text)
+}
+
+/// Least, mean (over elements, not areas) and largest value of a channel.
+fn range(values: &[[f64; 3]], channel: usize) -> [f64; 3] {
+    let channel = || values.iter().map(|v| v[channel]);
+    let least = channel().fold(f64::INFINITY, f64::min);
+    let largest = channel().fold(f64::NEG_INFINITY, f64::max);
+    [least, channel().sum::<f64>() / values.len().max(1) as f64, largest]
+}
+
+/// The report beside the file, if it is there and can be read: the energy balance stands in it.
+fn read_report(path: &Path) -> Option<Value> {
+    let text = std::fs::read_to_string(Report::path_for(path)).ok()?;
+    serde_json::from_str(&text).ok()
+}

@@ -1,0 +1,135 @@
+//! Enclosures whose radiosity is known: the values of published and independently computed networks.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{CUBE_ADJACENT, CUBE_OPPOSITE, Scene, assert_all_close, grey};
+use solve_tool::solve::Solver;
+
+/// One-patch-per-face cube, ceiling emits 1, uniform reflectance: wall, floor, ceiling.
+#[test]
+fn cube_with_a_glowing_ceiling() {
+    let table = [
+        (0.2, 0.048085017357, 0.048044544595, 1.009615385978),
+        (0.5, 0.181836268946, 0.181745826108, 1.090909098108),
+        (0.8, 0.689681193904, 0.689551070738, 1.551724153645),
+        (0.9, 1.525452018512, 1.525310551125, 2.372881374826),
+        (0.99, 16.527576099920, 16.527425127722, 17.362270472597),
+    ];
+    for (rho, wall, floor, ceiling) in table {
+        let b = Scene::cube().radiosity(&[rho; 6], &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+        assert_all_close(&b, &[wall, wall, wall, wall, floor, ceiling], 1e-9);
+    }
+}
+
+/// Front emits and reflects nothing, left red, right blue, the others 0.8; the red channel.
+#[test]
+fn goral_like_cube() {
+    let (left, right, back, rest) = (0.321817395787, 0.045743811982, 0.321673353271, 0.321775729479);
+    // Opposite pairs: left and right, front and back, floor and ceiling.
+    let b = Scene::cube().radiosity(&[0.8, 0.1, 0.0, 0.8, 0.8, 0.8], &[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+    assert_all_close(&b, &[left, right, 1.0, back, rest, rest], 1e-9);
+    let b = Scene::cube().radiosity(&[0.1, 0.8, 0.0, 0.8, 0.8, 0.8], &[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+    assert_all_close(&b, &[right, left, 1.0, back, rest, rest], 1e-9);
+}
+
+/// Box 1 x 1 x 2: patches 0-1 and 2-3 opposite 1 x 2 sides, 4-5 the unit squares.
+fn box_1_1_2() -> Scene {
+    let s = |i: usize, j: usize| match (i.min(j), i.max(j)) {
+        (i, j) if i == j => 0.0,
+        (0, 1) | (2, 3) => 0.571750769701,
+        (4, 5) => 0.068589588819,
+        (_, 4 | 5) => 0.232852602795,
+        _ => 0.481272012354,
+    };
+    let areas = vec![2.0, 2.0, 2.0, 2.0, 1.0, 1.0];
+    let scaled = areas.clone();
+    Scene::new(areas, |i, j| s(i, j) / scaled[i])
+}
+
+#[test]
+fn box_with_unequal_areas() {
+    let rho = [0.8, 0.3, 0.6, 0.6, 0.5, 0.7];
+    let b = box_1_1_2().radiosity(&rho, &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    let want =
+        [0.186558327450, 0.079169333763, 0.147421942927, 0.147421942927, 0.102863001806, 1.096310112350];
+    // The factors are given to 12 digits; errors of 5e-13 in them are amplified by at most 5.
+    assert_all_close(&b, &want, 1e-11);
+}
+
+#[test]
+fn grey_networks() {
+    // Infinite parallel plates: B1 = (E1 + r1 E2) / (1 - r1 r2).
+    let plates = Scene::new(vec![1.0; 2], |i, j| if i == j { 0.0 } else { 1.0 });
+    assert_all_close(&plates.radiosity(&[0.5, 0.5], &[1.0, 0.0]), &[4.0 / 3.0, 2.0 / 3.0], 1e-12);
+    assert_all_close(&plates.radiosity(&[0.9, 0.9], &[1.0, 0.0]), &[1.0 / 0.19, 0.9 / 0.19], 1e-11);
+    let want = [1.06 / 0.76, (0.2 + 0.8) / 0.76];
+    assert_all_close(&plates.radiosity(&[0.3, 0.8], &[1.0, 0.2]), &want, 1e-12);
+
+    // Convex body 1 in enclosure 2: F12 = 1, F21 = A1 / A2, F22 = 1 - A1 / A2.
+    let body = |ratio: f64| {
+        Scene::new(vec![ratio, 1.0], move |i, j| match (i, j) {
+            (0, 0) => 0.0,
+            (0, 1) => 1.0,
+            (1, 0) => ratio,
+            _ => 1.0 - ratio,
+        })
+    };
+    assert_all_close(&body(0.25).radiosity(&[0.5, 0.5], &[1.0, 0.0]), &[10.0 / 9.0, 2.0 / 9.0], 1e-12);
+    let want = [1.160714285714, 0.803571428571];
+    assert_all_close(&body(0.25).radiosity(&[0.2, 0.9], &[1.0, 0.0]), &want, 1e-11);
+    assert_all_close(&body(1.0 / 6.0).radiosity(&[0.5, 0.8], &[1.0, 0.0]), &[1.25, 0.5], 1e-12);
+}
+
+/// A furnace: E = 1 and rho everywhere gives B = 1 / (1 - rho), whatever the shape.
+#[test]
+fn furnace() {
+    // Cube factors to 20 digits close to 1 ulp; theirs errors grow by 1 / (1 - rho).
+    for rho in [0.2, 0.5, 0.8, 0.9, 0.95, 0.99, 0.999] {
+        let b = Scene::cube().radiosity(&[rho; 6], &[1.0; 6]);
+        let want: f64 = 1.0 / (1.0 - rho);
+        assert_all_close(&b, &[want; 6], 1e-14 * want * want);
+    }
+    // E = 1 - rho with any rho per face gives B = 1.
+    let rho: [f64; 6] = [0.1, 0.99, 0.5, 0.7, 0.0, 0.3];
+    assert_all_close(&Scene::cube().radiosity(&rho, &rho.map(|r| 1.0 - r)), &[1.0; 6], 1e-12);
+}
+
+/// A floor that reflects everything in a room that does not: finite, and solved.
+#[test]
+fn one_face_of_reflectance_one_is_solved() {
+    let rho = [0.6, 0.1, 0.7, 0.3, 1.0, 0.5];
+    let scene = Scene::cube();
+    let solved = scene.solve(&grey(&rho, &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]), Solver::Cg, 1e-12).unwrap();
+    let channel = &solved.channels[0];
+    assert!(channel.bound <= 1e-12, "bound {:e}", channel.bound);
+    // The floor passes on all that it gets.
+    assert!((channel.radiosity[4] - channel.irradiance[4]).abs() < 1e-14);
+    for i in 0..6 {
+        let f = |j: usize| match (i == j, i / 2 == j / 2) {
+            (true, _) => 0.0,
+            (_, true) => CUBE_OPPOSITE,
+            _ => CUBE_ADJACENT,
+        };
+        let arriving: f64 = (0..6).map(|j| f(j) * channel.radiosity[j]).sum();
+        assert!((arriving - channel.irradiance[i]).abs() < 1e-12, "{i}");
+    }
+}
+
+#[test]
+fn energy_is_accounted_for_in_open_and_closed_scenes() {
+    for most in [1.0, 0.6] {
+        let scene = common::random_scene(40, most, 7);
+        let mut next = common::random(3);
+        let rho: Vec<f64> = (0..40).map(|_| next()).collect();
+        let e: Vec<f64> = (0..40).map(|i| if i < 3 { 1.0 + next() } else { 0.0 }).collect();
+        let solved = scene.solve(&grey(&rho, &e), Solver::Cg, 1e-12).unwrap();
+        let energy = solved.channels[0].energy;
+        assert!(energy.escaped > 0.0 && energy.absorbed > 0.0);
+        assert!(energy.defect < 1e-11, "defect {:e}", energy.defect);
+    }
+    // A closed cube loses nothing: sum of (1 - rho) H A = sum of E A.
+    let solved = Scene::cube().solve(&grey(&[0.8; 6], &[1.0; 6]), Solver::Cg, 1e-12).unwrap();
+    let energy = solved.channels[2].energy;
+    assert!(energy.escaped.abs() < 1e-12 && (energy.absorbed - 6.0).abs() < 1e-11, "{energy:?}");
+}

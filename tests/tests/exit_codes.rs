@@ -1,0 +1,136 @@
+//! Exit codes: 2 for bad usage, flags of later versions included; 1 for what cannot be done; 0 for help.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use tests::{TOOLS, run, tool};
+
+/// Runs `line`, split at spaces, in an empty folder.
+fn exit(line: &str) -> tests::Run {
+    let folder = tests::folder();
+    let mut words = line.split_whitespace();
+    let name = words.next().expect("a tool");
+    run(tool(name).args(words).current_dir(folder.path()))
+}
+
+#[track_caller]
+fn assert_usage(line: &str) {
+    let done = exit(line);
+    assert!(done.code == Some(2), "{line}: exit {:?}: {}", done.code, done.stderr);
+    assert!(done.stderr.starts_with("error: "), "{line}: {}", done.stderr);
+    assert_eq!(done.stdout, "", "{line}");
+}
+
+#[test]
+fn help_and_version_are_data() {
+    for name in TOOLS {
+        for flag in ["--help", "--version"] {
+            let done = exit(&format!("{name} {flag}")).expect_code(0);
+            assert!(done.stdout.contains(name), "{name} {flag}: {}", done.stdout);
+            assert_eq!(done.stderr, "");
+        }
+    }
+}
+
+#[test]
+fn bad_usage_is_2() {
+    for name in TOOLS {
+        assert_eq!(exit(name).code, Some(2), "{name} without a subcommand");
+        assert_usage(&format!("{name} no-such-command"));
+        assert_usage(&format!("{name} info"));
+        assert_usage(&format!("{name} info a --no-such-flag"));
+        assert_usage(&format!("{name} info a --threads 0"));
+        assert_usage(&format!("{name} info a --threads many"));
+        assert_usage(&format!("{name} info a --quiet --verbose"));
+    }
+    for line in [
+        "mesh-tool build a.obj",
+        "mesh-tool materials a.obj",
+        "mesh-tool build a.obj -o a.mesh --elements 0",
+        "mesh-tool build a.obj -o a.mesh --elements -5",
+        "mesh-tool build a.obj -o a.mesh --max-edge 0",
+        "mesh-tool build a.obj -o a.mesh --max-edge nan",
+        "mesh-tool build a.obj -o a.mesh --max-edge inf",
+        "formfactor-tool compute a.mesh",
+        "formfactor-tool compute a.mesh -o a.ff --tolerance 0",
+        "formfactor-tool compute a.mesh -o a.ff --tolerance -1",
+        "formfactor-tool compute a.mesh -o a.ff --tolerance nan",
+        "formfactor-tool compute a.mesh -o a.ff --tolerance inf",
+        "formfactor-tool compute a.mesh -o a.ff --tolerance small",
+        "formfactor-tool export a.ff --mesh a.mesh -o a.csv",
+        "formfactor-tool export a.ff --mesh a.mesh -o a.csv --by node",
+        "solve-tool solve a.ff -o a.sol",
+        "solve-tool solve a.ff --mesh a.mesh",
+        "solve-tool solve a.ff --mesh a.mesh -o a.sol --tolerance 0",
+        "solve-tool solve a.ff --mesh a.mesh -o a.sol --tolerance nan",
+        "solve-tool export a.sol --mesh a.mesh -o a.csv --by node",
+        "shade-tool render a.sol -o a.exr",
+        "shade-tool render a.sol --mesh a.mesh",
+        "shade-tool render a.sol --mesh a.mesh -o a.exr --size 0x10",
+        "shade-tool render a.sol --mesh a.mesh -o a.exr --size 10",
+        "shade-tool probe a.sol --mesh a.mesh -o a.csv",
+    ] {
+        assert_usage(line);
+    }
+}
+
+/// Flags and subcommands of later versions: unknown until they do something.
+const LATER: [&str; 24] = [
+    "mesh-tool build a.obj -o a.mesh --discontinuity d1",
+    "mesh-tool build a.obj -o a.mesh --discontinuity off",
+    "mesh-tool build a.obj -o a.mesh --refine-with a.sol",
+    "mesh-tool build a.obj -o a.mesh --tolerance 0.01",
+    "mesh-tool compare a.mesh b.mesh",
+    "formfactor-tool compute a.mesh -o a.ff --closure report",
+    "formfactor-tool compute a.mesh -o a.ff --shard 1/2",
+    "formfactor-tool compute a.mesh -o a.ff --precision f64",
+    "formfactor-tool compute a.mesh -o a.ff --resolution 64",
+    "formfactor-tool compute a.mesh -o a.ff --rays 100",
+    "formfactor-tool compute a.mesh -o a.ff --method contour",
+    "formfactor-tool compute a.mesh -o a.ff --method area",
+    "formfactor-tool compute a.mesh -o a.ff --method hemicube",
+    "formfactor-tool compute a.mesh -o a.ff --method rays",
+    "formfactor-tool import f.npy --mesh a.mesh -o a.ff",
+    "formfactor-tool compare a.ff b.ff",
+    "solve-tool solve a.ff --mesh a.mesh -o a.sol --bounces 2",
+    "solve-tool solve a.ff --mesh a.mesh -o a.sol --solver jacobi",
+    "solve-tool solve a.ff --mesh a.mesh -o a.sol --solver gauss-seidel",
+    "solve-tool solve a.ff --mesh a.mesh -o a.sol --solver southwell",
+    "solve-tool compare a.sol b.sol",
+    "shade-tool render a.sol --mesh a.mesh -o a.exr --interpolation quadratic",
+    "shade-tool render a.sol --mesh a.mesh -o a.exr --interpolation linear",
+    "shade-tool compare a.exr b.exr",
+];
+
+#[test]
+fn what_belongs_to_later_versions_is_2_and_not_in_the_help() {
+    for line in LATER {
+        assert_usage(line);
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let later = words[words.len() - 2];
+        if !later.starts_with("--") || matches!(later, "--method" | "--solver") {
+            continue;
+        }
+        let help = exit(&format!("{} {} --help", words[0], words[1])).expect_code(0).stdout;
+        assert!(!help.contains(later), "{later} is in the help: {help}");
+    }
+}
+
+#[test]
+fn what_is_usable_now_is_taken() {
+    // Good usage on files that are not there: 1, not 2.
+    for (line, file) in [
+        ("mesh-tool build a.obj -o a.mesh --elements 50", "a.obj"),
+        ("mesh-tool build a.obj -o a.mesh --max-edge 0.5 --threads 2 --quiet", "a.obj"),
+        ("mesh-tool materials a.obj -o a.materials --depfile a.d", "a.obj"),
+        ("formfactor-tool compute a.mesh -o a.ff --method auto --tolerance 1e-6", "a.mesh"),
+        ("formfactor-tool export a.ff --mesh a.mesh --by group -o a.csv", "a."),
+        ("solve-tool solve a.ff --mesh a.mesh --solver cg -o a.sol --verbose", "a."),
+        ("solve-tool solve a.ff --mesh a.mesh --solver direct -o a.sol", "a."),
+        ("solve-tool export a.sol --mesh a.mesh --by element -o a.npy", "a."),
+        ("shade-tool render a.sol --mesh a.mesh -o a.exr --png a.png --size 40x30", "a."),
+        ("shade-tool probe a.sol --mesh a.mesh --points p.csv -o a.csv", "p.csv"),
+    ] {
+        let done = exit(line).expect_code(1);
+        assert!(done.stderr.contains(": error: ") && done.stderr.contains(file), "{line}: {}", done.stderr);
+        assert_eq!(done.stdout, "", "{line}");
+    }
+}
