@@ -2,8 +2,7 @@
 
 use crate::tile::{self, Counts, Leaf, Scene, Tile};
 use anyhow::Context;
-use geometry::merge::merge_coplanar;
-use geometry::occluder::Occluder;
+use geometry::merge::merged_occluders;
 use geometry::pair::Accuracy;
 use geometry::patch::Patch;
 use geometry::sides::SideBits;
@@ -81,10 +80,7 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
 fn prepare(mesh: &Mesh) -> anyhow::Result<Scene> {
     let pieces = mesh.occluders.rows().map(|row| row.iter().map(|v| v.0).collect()).collect();
     let positions: Vec<DVec3> = mesh.vertices.iter().copied().map(DVec3::from_array).collect();
-    let occluders: Vec<Occluder> = merge_coplanar(pieces, &positions)
-        .into_iter()
-        .filter_map(|piece| Occluder::new(piece.iter().map(|&k| positions[k as usize]).collect()))
-        .collect();
+    let occluders = merged_occluders(pieces, &positions);
     let patches = mesh
         .element_ids()
         .map(|e| {

@@ -1,8 +1,9 @@
 //! Command line of the form-factor stage.
 
 use clap::{Parser, Subcommand, ValueEnum};
-use formfactor_tool::compute;
-use interchange::tool::{Common, Finish, exit_code};
+use formfactor_tool::{compute, export, info};
+use interchange::grouping::By;
+use interchange::tool::{Common, Finish, exit_code, print_data};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -32,6 +33,28 @@ enum Command {
         #[arg(long, value_enum, default_value = "auto")]
         method: Method,
     },
+    /// Write the factors F(i -> j) as a table
+    Export {
+        /// Matrix file
+        matrix: PathBuf,
+        /// Mesh it was computed for
+        #[arg(long, value_name = "FILE")]
+        mesh: PathBuf,
+        /// Sum over elements, faces of the scene, or groups
+        #[arg(long, value_enum)]
+        by: By,
+        /// Table to write: .csv, .npy or .mtx
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
+    },
+    /// Describe a matrix file on one page
+    Info {
+        /// Matrix file
+        file: PathBuf,
+        /// The same as JSON
+        #[arg(long)]
+        json: bool,
+    },
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -42,9 +65,12 @@ enum Method {
 fn run(cli: Cli) -> anyhow::Result<Finish> {
     match cli.command {
         Command::Compute { mesh, output, tolerance, method: Method::Auto } => {
-            compute::run(&compute::Request { mesh, output, tolerance }, &cli.common)
+            return compute::run(&compute::Request { mesh, output, tolerance }, &cli.common);
         }
+        Command::Export { matrix, mesh, by, output } => export::run(&matrix, &mesh, by, &output)?,
+        Command::Info { file, json } => print_data(&info::describe(&file, json)?)?,
     }
+    Ok(Finish::Done)
 }
 
 fn main() -> ExitCode {

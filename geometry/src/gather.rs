@@ -51,10 +51,8 @@ impl Cone {
 }
 
 impl Gatherer {
-    /// Prepares convex `occluders` and convex `elements`, one-sided, front counter-clockwise. Elements and occluders
-    /// without area take no part.
-    pub fn new(occluders: Vec<Vec<DVec3>>, elements: Vec<Vec<DVec3>>) -> Gatherer {
-        let occluders: Vec<Occluder> = occluders.into_iter().filter_map(Occluder::new).collect();
+    /// Prepares `occluders` and convex `elements`, one-sided, front counter-clockwise. Elements without area take no part.
+    pub fn new(occluders: Vec<Occluder>, elements: Vec<Vec<DVec3>>) -> Gatherer {
         let prepare = |(index, corners): (usize, Vec<DVec3>)| {
             let patch = Patch::new(corners)?;
             let bits = SideBits::of_patch(&patch.corners, &patch.plane, patch.radius, &occluders);
@@ -140,7 +138,8 @@ mod tests {
         for scale in [1e-6, 1.0, 1e6] {
             let mut faces = cube_faces(0.0, scale, true);
             faces.extend(cube_faces(0.25 * scale, 0.75 * scale, false));
-            let gatherer = Gatherer::new(faces.clone(), faces);
+            let occluders = faces.iter().cloned().filter_map(Occluder::new).collect();
+            let gatherer = Gatherer::new(occluders, faces);
             let mut scratch = Scratch::default();
             for (point, normal) in [
                 (DVec3::new(0.3, 0.4, 0.0), DVec3::Z),

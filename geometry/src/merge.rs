@@ -3,6 +3,7 @@
 //! What blocks light has no need of the faces' borders. Fewer blockers mean shorter lists, and edges inside a wall are
 //! no shadow lines. Greedy: two polygons that share a whole edge are joined where their union is convex.
 
+use crate::occluder::Occluder;
 use crate::plane::PLANARITY;
 use crate::polygon;
 use glam::DVec3;
@@ -11,6 +12,12 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Corners where the border turns by less than this (radians) are dropped, and unions may bend inward by as much:
 /// over an edge of length L the border moves by less than `STRAIGHTNESS` L, like a face's corners off its plane.
 const STRAIGHTNESS: f64 = PLANARITY;
+
+/// What blocks light in a scene of convex `pieces`, given as indices into `positions`: joined, pieces without area left out.
+pub fn merged_occluders(pieces: Vec<Vec<u32>>, positions: &[DVec3]) -> Vec<Occluder> {
+    let corners = |piece: Vec<u32>| piece.iter().map(|&k| positions[k as usize]).collect();
+    merge_coplanar(pieces, positions).into_iter().filter_map(|piece| Occluder::new(corners(piece))).collect()
+}
 
 /// Joins convex polygons, given as indices into `positions`, where two share an edge, lie in one plane and have a convex
 /// union. Polygons that look opposite ways are not joined. The order of the result follows the first piece of each.

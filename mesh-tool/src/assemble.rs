@@ -15,17 +15,21 @@ use interchange::scene::Scene;
 use std::collections::HashMap;
 
 /// Puts the mesh together. With `six_nodes` every edge gets a node in its middle.
+///
+/// New corners that lie within the weld tolerance of a place become that place, so that walls share the vertices of
+/// their common edge. An element that has no area any more after that was thinner than the tolerance: it is left out
+/// and counted in the second result.
 pub fn assemble(
     scene: &Scene,
     cleaned: Cleaned,
     pieces: &Pieces,
     patches: &[(&Layer, Patch)],
     six_nodes: bool,
-) -> Mesh {
+) -> (Mesh, usize) {
     let Cleaned { mut places, faces } = cleaned;
     let diagonal = polygon::diameter(places.positions());
     let centre = polygon::mean_corner(places.positions());
-    let (mut elements, mut lines) = (Vec::new(), Vec::new());
+    let (mut elements, mut lines, mut flat) = (Vec::new(), Vec::new(), 0);
     for (number, (layer, patch)) in patches.iter().enumerate() {
         let vertices: Vec<u32> =
             patch.points.iter().map(|p| p.place.unwrap_or_else(|| places.insert(p.position))).collect();
@@ -33,6 +37,17 @@ pub fn assemble(
             let sheet = &layer.sheets[element.sheet as usize];
             let mut corners: Vec<u32> = element.corners.iter().map(|&p| vertices[p as usize]).collect();
             let mut seams = element.seams.clone();
+            for k in (0..corners.len()).rev() {
+                if corners.len() > 1 && corners[k] == corners[(k + 1) % corners.len()] {
+                    corners.remove(k);
+                    seams.remove(k);
+                }
+            }
+            let area = polygon::vector_area(&places.corners(&corners)).dot(layer.frame.plane.normal);
+            if corners.len() < 3 || area <= 0.0 {
+                flat += 1;
+                continue;
+            }
             if layer.reversed {
                 // The edge after the last corner stays the last one.
                 corners.reverse();
@@ -49,6 +64,7 @@ pub fn assemble(
             order: 0,
             source: FaceId(line.source),
         }));
+        lines.retain(|line: &Line| line.from != line.to);
     }
 
     // Number the elements in cluster order.
@@ -76,7 +92,7 @@ pub fn assemble(
     let middles = six_nodes.then(|| middles(&elements, &mut vertices.positions));
     let nodes = nodes::number(&elements, middles.as_deref());
 
-    Mesh {
+    let mesh = Mesh {
         vertices: vertices.positions.iter().map(DVec3::to_array).collect(),
         elements: elements.iter().map(|e| e.corners.iter().copied().map(VertexId).collect()).collect(),
         element_nodes: nodes.of_elements,
@@ -101,7 +117,8 @@ pub fn assemble(
         groups: scene.groups.clone(),
         materials: scene.materials.names.clone(),
         input_face_count: scene.faces.len() as u32,
-    }
+    };
+    (mesh, flat)
 }
 
 /// Vertices of the mesh, numbered when first used.

@@ -101,10 +101,10 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
     report.count("overlapping faces cut", total(|p| p.overlapping));
     report.count("crossing faces cut", total(|p| p.crossing));
     report.count("contact lines", total(|p| p.contacts));
-    report.count("triangles without area left out", total(|p| p.degenerate));
-    let mesh = assemble(scene, cleaned, &pieces, &patches, options.meshes());
-    measure(&mesh, report);
+    let (mesh, flat) = assemble(scene, cleaned, &pieces, &patches, options.meshes());
+    report.count("pieces without area left out", flat);
     note(report, "assemble", start);
+    measure(&mesh, report);
     if mesh.elements.is_empty() {
         return Err(Error::whole(
             &scene.path,

@@ -107,11 +107,6 @@ impl Drawing {
         };
         for (t, triangle) in triangulation.triangles.iter().enumerate() {
             let Some(sheet) = winners[t] else { continue };
-            let positions = triangle.corners.map(|p| graph.points[p as usize].position);
-            if polygon::vector_area(&positions).dot(self.layer.frame.plane.normal) <= 0.0 {
-                patch.degenerate += 1;
-                continue;
-            }
             let mut seams = vec![false; 3];
             for (k, seam) in seams.iter_mut().enumerate() {
                 let Some(edge) = triangle.constraints[k].map(|edge| &graph.edges[edge as usize]) else {

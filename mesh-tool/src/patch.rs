@@ -41,6 +41,4 @@ pub struct Patch {
     pub crossing: usize,
     /// Contact lines on the layer, before they are split.
     pub contacts: usize,
-    /// Triangles without area that were left out.
-    pub degenerate: usize,
 }

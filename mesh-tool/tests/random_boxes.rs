@@ -105,4 +105,24 @@ proptest! {
             assert_areas(&made(&scene, options).0, 1e-9);
         }
     }
+
+    #[test]
+    fn nearly_coinciding_boxes_never_fail(
+        boxes in prop::collection::vec(any_grid_box(), 2..6),
+        seed in 0..1000u64,
+        power in 5..=14i32,
+    ) {
+        let mut scene = scene_of(&scene_text(&boxes, true));
+        let mut state = seed;
+        let mut jitter = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            10f64.powi(-power) * ((state >> 33) as f64 / f64::from(1u32 << 30) - 1.0)
+        };
+        for vertex in &mut scene.vertices {
+            *vertex = vertex.map(|x| x + jitter());
+        }
+        for options in [given(), elements(300)] {
+            made(&scene, options);
+        }
+    }
 }

@@ -189,7 +189,9 @@ fn warn_of_range(picture: &Picture, precision: Precision, report: &mut Report) {
         }
         Fit::TooDark => {
             let highest = picture.highest();
-            report.warn(format!("the picture is too dark to keep all digits (at most {highest:.1e}); {remedy}"));
+            report.warn(format!(
+                "the picture is too dark to keep all digits (at most {highest:.1e}); {remedy}"
+            ));
         }
     }
 }

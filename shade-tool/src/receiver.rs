@@ -3,6 +3,7 @@
 
 use crate::lit_scene::LitScene;
 use geometry::gather::{Gatherer, Scratch};
+use geometry::merge::merged_occluders;
 use glam::DVec3;
 
 /// Points on the border of a face or element take the limit from inside: they are moved by this part of the way towards
@@ -25,7 +26,7 @@ pub struct Receiver {
     pub point: DVec3,
     /// Unit normal of the plane that receives.
     pub normal: DVec3,
-    /// Face that the point lies on; it and those coplanar with it never block.
+    /// Face that the point lies on, if any.
     pub face: Option<u32>,
 }
 
@@ -41,8 +42,9 @@ impl<'a> Light<'a> {
     pub fn new(scene: &'a LitScene) -> Light<'a> {
         let mesh = &scene.mesh;
         let elements = mesh.element_ids().map(|element| mesh.element_corners(element)).collect();
-        let gatherer =
-            Gatherer::new(scene.pieces(), mesh.occluder_faces.iter().map(|face| face.0).collect(), elements);
+        let pieces = mesh.occluders.rows().map(|row| row.iter().map(|v| v.0).collect()).collect();
+        let positions: Vec<DVec3> = mesh.vertices.iter().copied().map(DVec3::from_array).collect();
+        let gatherer = Gatherer::new(merged_occluders(pieces, &positions), elements);
         Light { gatherer, radiosity: &scene.radiosity }
     }
 
@@ -54,7 +56,7 @@ impl<'a> Light<'a> {
                 *sum += factor * b_j;
             }
         };
-        self.gatherer.factors(receiver.point, receiver.normal, receiver.face, scratch, &mut add);
+        self.gatherer.factors(receiver.point, receiver.normal, scratch, &mut add);
         irradiance
     }
 }
