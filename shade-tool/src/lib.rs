@@ -1,13 +1,12 @@
 //! Radiosity to pictures and points: the last stage of the pipeline.
 //!
 //! [`render`] finds the surface that each sample of a pixel sees ([`visible`]), gathers irradiance at the nodes of the
-//! elements that are seen ([`nodes`], [`node_places`]), interpolates radiosity linearly between them ([`interpolation`]) and writes
+//! facets that are seen ([`facets`], [`nodes`], [`node_places`]), interpolates radiosity linearly between them ([`interpolation`]) and writes
 //! radiance as OpenEXR ([`exr_file`]) and a tone-mapped preview ([`preview`]). [`probe`] gathers irradiance at the
 //! points of a table. [`info`] tells what a picture holds.
 //!
 //! # Limitations
-//! Surfaces are seen as Lambertian: specular and transparent parts of a material do not show. Interpolation uses the
-//! corner nodes only.
+//! Surfaces are seen as Lambertian: specular and transparent parts of a material do not show.
 
 #![forbid(unsafe_code)]
 
@@ -17,6 +16,7 @@ pub mod convex;
 pub mod error;
 pub mod exr_file;
 pub mod face_elements;
+pub mod facets;
 pub mod info;
 pub mod interpolation;
 pub mod lit_scene;

@@ -1,6 +1,7 @@
 //! Mesh, solution and materials read together and checked against each other.
 
 use crate::error::Result;
+use crate::facets::drawn_mesh;
 use glam::DVec3;
 use interchange::digest::Digest;
 use interchange::ids::{ElementId, FaceId};
@@ -15,9 +16,11 @@ use std::path::Path;
 /// A mesh with the radiosity of each element.
 #[derive(Debug)]
 pub struct LitScene {
-    /// Geometry and names.
+    /// Geometry and names, the elements cut into the facets that are drawn.
     pub mesh: Mesh,
-    /// Radiosity of every element, RGB, W m^-2.
+    /// Corners of the elements that were solved.
+    pub sources: Vec<Vec<DVec3>>,
+    /// Radiosity of every source, RGB, W m^-2.
     pub radiosity: Vec<[f64; 3]>,
     /// Materials in the mesh's order.
     pub materials: Vec<Material>,
@@ -55,7 +58,9 @@ impl LitScene {
         }
         let inputs =
             vec![("solution", solution_digest), ("mesh", mesh_digest), ("materials", materials_digest)];
-        Ok(LitScene { mesh, radiosity: solution.radiosity, materials, inputs })
+        let sources = mesh.element_ids().map(|element| mesh.element_corners(element)).collect();
+        let mesh = drawn_mesh(&mesh);
+        Ok(LitScene { mesh, sources, radiosity: solution.radiosity, materials, inputs })
     }
 
     /// Adds the inputs to a provenance.
@@ -63,7 +68,7 @@ impl LitScene {
         self.inputs.iter().fold(provenance, |provenance, &(role, digest)| provenance.input(role, digest))
     }
 
-    /// Material of an element.
+    /// Material of a facet.
     pub fn material(&self, element: ElementId) -> &Material {
         &self.materials[self.mesh.element_material(element).index()]
     }

@@ -41,10 +41,9 @@ impl<'a> Light<'a> {
     /// The elements of the scene as sources, its faces as blockers.
     pub fn new(scene: &'a LitScene) -> Light<'a> {
         let mesh = &scene.mesh;
-        let elements = mesh.element_ids().map(|element| mesh.element_corners(element)).collect();
         let pieces = mesh.occluders.rows().map(|row| row.iter().map(|v| v.0).collect()).collect();
         let positions: Vec<DVec3> = mesh.vertices.iter().copied().map(DVec3::from_array).collect();
-        let gatherer = Gatherer::new(merged_occluders(pieces, &positions), elements);
+        let gatherer = Gatherer::new(merged_occluders(pieces, &positions), scene.sources.clone());
         Light { gatherer, radiosity: &scene.radiosity }
     }
 

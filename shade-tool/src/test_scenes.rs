@@ -53,7 +53,8 @@ pub fn lit(mesh: Mesh) -> LitScene {
     let radiosity = vec![[1.0; 3]; mesh.element_count()];
     let inputs = vec![("mesh", Digest::of(b"mesh"))];
     let materials = vec![Material { diffuse: [1.0; 3], ..Material::default() }];
-    LitScene { mesh, radiosity, materials, inputs }
+    let sources = mesh.element_ids().map(|element| mesh.element_corners(element)).collect();
+    LitScene { mesh, sources, radiosity, materials, inputs }
 }
 
 /// The unit cube with inward fronts, n x n elements to a wall.
