@@ -55,6 +55,8 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     let accuracy = Accuracy {
         unoccluded: UNOCCLUDED_SHARE * request.tolerance,
         occluded: OCCLUDED_SHARE * request.tolerance,
+        // Over a row these shares add up to one more factor of 1.
+        least_factor: 1.0 / scene.patches.len() as f64,
         most_evaluations: MOST_EVALUATIONS,
     };
     let pairs: Vec<(usize, usize)> =

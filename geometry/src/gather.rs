@@ -99,7 +99,7 @@ impl Gatherer {
                         blockers.push(&self.occluders[k]);
                     }
                 });
-                visible_factor(point, normal, &element.corners, blockers, visible)
+                visible_factor(point, normal, &element.corners, &blockers, visible).factor
             } else {
                 point_factor(point, normal, &element.corners, cut).max(0.0)
             };

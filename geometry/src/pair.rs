@@ -29,6 +29,8 @@ pub struct Accuracy {
     pub unoccluded: f64,
     /// Error of an occluded factor, relative to the factor without blockers.
     pub occluded: f64,
+    /// Factor (of the smaller patch) whose relative error is asked of smaller factors too: they cannot matter more.
+    pub least_factor: f64,
     /// Most visible parts computed for one pair.
     pub most_evaluations: usize,
 }
@@ -81,7 +83,7 @@ fn exchange_in_front<'a>(
     // The smaller patch receives: shadow planes are fewer across it, and the source is cut exactly anyway.
     let (receiver, source) = if q.area < p.area { (q, p) } else { (p, q) };
     let unblocked = unblocked_size(p, q);
-    let tolerance = accuracy.occluded * unblocked;
+    let tolerance = accuracy.occluded * unblocked.max(accuracy.least_factor * p.area.min(q.area));
     let (found, effort) =
         occluded::exchange(receiver, source, blockers, tolerance, accuracy.most_evaluations, scratch);
     (found, Class::Occluded(effort))

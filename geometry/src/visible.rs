@@ -45,15 +45,25 @@ pub struct Scratch {
     sides: Vec<DVec3>,
 }
 
+/// What a point sees of a polygon.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Visible {
+    /// Form factor of the visible part.
+    pub factor: f64,
+    /// The blocker (its place in the list) that took the last visible piece, where nothing is left. Asked first, it
+    /// often settles the next point alone.
+    pub last: Option<usize>,
+}
+
 /// Form factor from a surface element at `point` with unit `normal` to the front of a convex polygon, as far as
 /// the `blockers` leave it in sight. The point must lie in front of the polygon's plane.
-pub fn visible_factor<'a>(
+pub fn visible_factor(
     point: DVec3,
     normal: DVec3,
     corners: &[DVec3],
-    blockers: impl IntoIterator<Item = &'a Occluder>,
+    blockers: &[&Occluder],
     scratch: &mut Scratch,
-) -> f64 {
+) -> Visible {
     // The polygon above the horizon, seen from the point as origin.
     let Scratch { pieces, next, rest, cut, sides } = scratch;
     rest.clear();
@@ -62,24 +72,21 @@ pub fn visible_factor<'a>(
     pieces.clear();
     pieces.push(cut);
 
-    for blocker in blockers {
-        if pieces.ends.is_empty() {
-            return 0.0;
-        }
+    for (k, blocker) in blockers.iter().enumerate() {
         let height = blocker.plane.distance(point);
-        if height == 0.0 {
+        let inward = -height.signum();
+        let beyond = |r: DVec3| inward * (blocker.plane.normal.dot(r) + height);
+        if height == 0.0 || pieces.points.iter().all(|&r| beyond(r) <= 0.0) {
             continue;
         }
-        // Inward normals of the pyramid's sides, and of its base: beyond the blocker's plane.
+        // Inward normals of the pyramid's sides; its base is the blocker's plane.
         sides.clear();
-        let inward = -height.signum();
         sides.extend(polygon::edges(&blocker.corners).map(|(a, b)| inward * (a - point).cross(b - point)));
-        let beyond = |r: DVec3| inward * (blocker.plane.normal.dot(r) + height);
 
         next.clear();
         for piece in pieces.iter() {
-            let untouched = piece.iter().all(|&r| beyond(r) <= 0.0)
-                || sides.iter().any(|side| piece.iter().all(|&r| side.dot(r) <= 0.0));
+            let untouched = sides.iter().any(|side| piece.iter().all(|&r| side.dot(r) <= 0.0))
+                || piece.iter().all(|&r| beyond(r) <= 0.0);
             if untouched {
                 next.push(piece);
                 continue;
@@ -88,6 +95,9 @@ pub fn visible_factor<'a>(
             rest.clear();
             rest.extend_from_slice(piece);
             for side in sides.iter() {
+                if rest.iter().all(|&r| side.dot(r) >= 0.0) {
+                    continue;
+                }
                 polygon::clip_by(rest, |r| -side.dot(r), cut);
                 next.push(cut);
                 polygon::clip_by(rest, |r| side.dot(r), cut);
@@ -96,12 +106,18 @@ pub fn visible_factor<'a>(
                     break;
                 }
             }
-            polygon::clip_by(rest, |r| -beyond(r), cut);
-            next.push(cut);
+            if rest.iter().any(|&r| beyond(r) < 0.0) {
+                polygon::clip_by(rest, |r| -beyond(r), cut);
+                next.push(cut);
+            }
         }
         std::mem::swap(pieces, next);
+        if pieces.ends.is_empty() {
+            return Visible { factor: 0.0, last: Some(k) };
+        }
     }
-    pieces.iter().map(|piece| above_horizon(DVec3::ZERO, normal, piece)).sum::<f64>().max(0.0)
+    let factor = pieces.iter().map(|piece| above_horizon(DVec3::ZERO, normal, piece)).sum::<f64>().max(0.0);
+    Visible { factor, last: None }
 }
 
 #[cfg(test)]
@@ -121,7 +137,14 @@ mod tests {
 
     fn seen(x: f64, y: f64, blockers: &[Occluder]) -> f64 {
         let light = square(0.5, 4.0, true);
-        visible_factor(DVec3::new(x, y, 0.0), DVec3::Z, &light, blockers, &mut Scratch::default())
+        visible_factor(
+            DVec3::new(x, y, 0.0),
+            DVec3::Z,
+            &light,
+            &blockers.iter().collect::<Vec<_>>(),
+            &mut Scratch::default(),
+        )
+        .factor
     }
 
     /// Light [-.5, .5]^2 at z = 4, occluder [-1, 1]^2 at z = 2: values to 1e-12 from an independent computation.
@@ -163,10 +186,10 @@ mod tests {
     fn a_contact_wall_blocks_one_side_only() {
         // Wall x = 0, |y| <= 1, 0 <= z <= 1 on the floor; light [1.5, 2.5] x [-.5, .5] at z = 4.
         let wall = [(-1.0, 0.0), (1.0, 0.0), (1.0, 1.0), (-1.0, 1.0)].map(|(y, z)| DVec3::new(0.0, y, z));
-        let wall = [Occluder::new(wall.to_vec()).unwrap()];
+        let wall = Occluder::new(wall.to_vec()).unwrap();
         let light = [(1.5, 0.5), (2.5, 0.5), (2.5, -0.5), (1.5, -0.5)].map(|(x, y)| DVec3::new(x, y, 4.0));
         let seen = |x: f64, y: f64| {
-            visible_factor(DVec3::new(x, y, 0.0), DVec3::Z, &light, &wall, &mut Scratch::default())
+            visible_factor(DVec3::new(x, y, 0.0), DVec3::Z, &light, &[&wall], &mut Scratch::default()).factor
         };
         assert!((seen(1e-12, 0.0) - 0.012_646_605_888).abs() < 1e-12);
         assert!((seen(1e-12, 0.9) - 0.011_701_807_558).abs() < 1e-12);
@@ -179,12 +202,14 @@ mod tests {
     fn a_blocker_that_crosses_the_light_hides_only_what_is_behind_it() {
         // A vertical plate through the light's middle, from z = 2 to 5, across the whole light: from x = 1 the far half is hidden.
         let plate = [(-2.0, 2.0), (2.0, 2.0), (2.0, 5.0), (-2.0, 5.0)].map(|(y, z)| DVec3::new(0.0, y, z));
-        let plate = [Occluder::new(plate.to_vec()).unwrap()];
+        let plate = Occluder::new(plate.to_vec()).unwrap();
         let near_half: Vec<DVec3> =
             [(0.0, 0.5), (0.5, 0.5), (0.5, -0.5), (0.0, -0.5)].map(|(x, y)| DVec3::new(x, y, 4.0)).to_vec();
         let point = DVec3::new(1.0, 0.0, 0.0);
-        let want = visible_factor(point, DVec3::Z, &near_half, &[], &mut Scratch::default());
-        let got = visible_factor(point, DVec3::Z, &square(0.5, 4.0, true), &plate, &mut Scratch::default());
+        let want = visible_factor(point, DVec3::Z, &near_half, &[], &mut Scratch::default()).factor;
+        let got =
+            visible_factor(point, DVec3::Z, &square(0.5, 4.0, true), &[&plate], &mut Scratch::default())
+                .factor;
         assert!((got - want).abs() < 1e-16, "{got} {want}");
     }
 }
