@@ -59,14 +59,15 @@ if (elements < 200) elements = 200;
 if (elements > 20000) elements = 20000;
 ff_tolerance = 2 * e; if (ff_tolerance > 0.5) ff_tolerance = 0.5;
 solve_tolerance = e; if (solve_tolerance > 0.5) solve_tolerance = 0.5;
+shade_tolerance = e;
 endef
 
 quote := '
 quoted = $(quote)$(subst $(quote),$(quote)\$(quote)$(quote),$(strip $1))$(quote)
 derived := $(shell LC_ALL=C awk -v given=$(call quoted,$(ERROR)) 'BEGIN { e = given + 0; \
   if (given !~ /^[0-9]*[.]?[0-9]+([eE][-+]?[0-9]+)?$$/ || e <= 0 || e > 1) exit; \
-  $(CALIBRATION) printf "%d %.6g %.6g", elements + 0.5, ff_tolerance, solve_tolerance }')
-ifneq ($(words $(derived)),3)
+  $(CALIBRATION) printf "%d %.6g %.6g %.6g", elements + 0.5, ff_tolerance, solve_tolerance, shade_tolerance }')
+ifneq ($(words $(derived)),4)
 $(error pipeline.mk: ERROR = $(ERROR): expected a number above 0 and at most 1, such as 0.02)
 endif
 
@@ -79,7 +80,8 @@ solve_flags = $(call unless,$(SOLVE_FLAGS),--tolerance,--tolerance $(word 3,$(de
 # The camera is the scene's toml where that has one; otherwise shade-tool frames the scene itself.
 TOML := $(wildcard $(basename $(SCENE)).toml)
 camera      := $(if $(TOML),$(shell grep -Eq '^[[:space:]]*(\[+[[:space:]]*)?camera' $(TOML) && echo --camera $(TOML)))
-shade_flags  = $(call unless,$(SHADE_FLAGS),--camera,$(camera)) $(SHADE_FLAGS)
+shade_flags  = $(call unless,$(SHADE_FLAGS),--camera,$(camera)) \
+  $(call unless,$(SHADE_FLAGS),--tolerance,--tolerance $(word 4,$(derived))) $(SHADE_FLAGS)
 
 # ---- Paths make cannot handle are refused before anything runs -----------------------------------------------------
 
