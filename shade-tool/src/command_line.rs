@@ -102,6 +102,9 @@ pub struct RenderArguments {
     /// Samples along each side of a pixel
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
     pub samples: u32,
+    /// Cut facets while the middle of an edge is off linear interpolation by more than this part of its value
+    #[arg(long, value_name = "E", default_value_t = 0.02, value_parser = positive)]
+    pub tolerance: f64,
     /// Brighten the preview by so many powers of two
     #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = stops, allow_hyphen_values = true, requires = "png")]
     pub exposure: f64,
@@ -162,12 +165,14 @@ fn run_render(arguments: &RenderArguments, common: &Common) -> Result<()> {
 
     let provenance = Provenance::new(TOOL, VERSION)
         .flag(format!("--samples {}", arguments.samples))
+        .flag(format!("--tolerance {}", arguments.tolerance))
         .flag(if arguments.float { "--float" } else { "--half" })
         .flag(format!("camera {}", camera.describe()));
     let provenance = scene.sign(provenance);
     report.flags.clone_from(&provenance.flags);
 
-    let picture = render::render(&scene, &camera, arguments.samples as usize, common, &mut report);
+    let quality = render::Quality { samples: arguments.samples as usize, tolerance: arguments.tolerance };
+    let picture = render::render(&scene, &camera, quality, common, &mut report);
     warn_of_range(&picture, precision, &mut report);
     report.phase("write", || {
         exr_file::write(&arguments.output, &picture, precision, &provenance)?;

@@ -1,7 +1,8 @@
 //! Radiosity to pictures and points: the last stage of the pipeline.
 //!
 //! [`render`] finds the surface that each sample of a pixel sees ([`visible`]), gathers irradiance at the nodes of the
-//! facets that are seen ([`facets`], [`nodes`], [`node_places`]), interpolates radiosity linearly between them ([`interpolation`]) and writes
+//! facets that are seen ([`facets`], [`nodes`], [`node_places`]), cuts facets over which radiosity is not linear ([`refined`]), interpolates linearly
+//! ([`interpolation`]) and writes
 //! radiance as OpenEXR ([`exr_file`]) and a tone-mapped preview ([`preview`]). [`probe`] gathers irradiance at the
 //! points of a table. [`info`] tells what a picture holds.
 //!
@@ -28,6 +29,7 @@ pub mod points;
 pub mod preview;
 pub mod probe;
 pub mod receiver;
+pub mod refined;
 pub mod render;
 pub mod visible;
 

@@ -4,7 +4,9 @@
 use crate::lit_scene::LitScene;
 use crate::node_places::{NodePlace, NodePlaces, corner_nodes};
 use crate::receiver::{Light, Receiver};
+use crate::refined::Corner;
 use geometry::gather::Scratch;
+use glam::DVec3;
 use interchange::ids::{ElementId, NodeId, VertexId};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -32,6 +34,17 @@ pub struct NodeRadiosity<'a> {
     on_edges: HashMap<NodeEdge, [f64; 3]>,
     /// What was done.
     pub counts: Counts,
+}
+
+/// The corners of a triangle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ends {
+    /// Numbers of the nodes.
+    pub ids: [u32; 3],
+    /// Places.
+    pub points: [DVec3; 3],
+    /// Radiosity.
+    pub corners: [Corner; 3],
 }
 
 /// How many nodes were treated how.
@@ -93,12 +106,11 @@ impl<'a> NodeRadiosity<'a> {
 
         // Gather.
         begin(whole.len() + edges.len());
-        let (scene, light) = (self.scene, &self.light);
+        let this = &*self;
         let gathered = |scratch: &mut Scratch, element: ElementId, receiver: &Receiver| {
-            let (material, irradiance) = (scene.material(element), light.irradiance(receiver, scratch));
-            let exitance = material.exitance();
+            let radiosity = this.gathered(element, receiver, scratch);
             done();
-            std::array::from_fn(|c| exitance[c] + material.diffuse[c] * irradiance[c])
+            radiosity
         };
         let at_nodes: Vec<[f64; 3]> = whole
             .par_iter()
@@ -121,6 +133,43 @@ impl<'a> NodeRadiosity<'a> {
         self.counts.whole += whole.len();
         self.counts.split += split;
         self.counts.edges += edges.len();
+    }
+
+    /// Radiosity of the element's material at a receiver: B = E + rho H.
+    pub fn gathered(&self, element: ElementId, receiver: &Receiver, scratch: &mut Scratch) -> [f64; 3] {
+        let (material, irradiance) = (self.scene.material(element), self.light.irradiance(receiver, scratch));
+        let exitance = material.exitance();
+        std::array::from_fn(|c| exitance[c] + material.diffuse[c] * irradiance[c])
+    }
+
+    /// Whether the element's material reflects anything.
+    pub fn reflects(&self, element: ElementId) -> bool {
+        self.scene.material(element).diffuse != [0.0; 3]
+    }
+
+    /// Number of nodes of the mesh.
+    pub fn node_count(&self) -> usize {
+        self.states.len()
+    }
+
+    /// What a triangle with gathered nodes has at its corners; `None` for other polygons.
+    pub fn ends(&self, element: ElementId) -> Option<Ends> {
+        let (nodes, corners) = self.corners(element);
+        let (nodes, vertices) =
+            (<[NodeId; 3]>::try_from(nodes).ok()?, <[VertexId; 3]>::try_from(corners).ok()?);
+        let value = |k: usize| match self.states[nodes[k].index()] {
+            State::Whole(value) => Some(Corner { before: value, after: value }),
+            State::Split => {
+                let towards = |end: usize| self.on_edges.get(&(nodes[k], vertices[end % 3])).copied();
+                Some(Corner { before: towards(k + 2)?, after: towards(k + 1)? })
+            }
+            State::Unknown => None,
+        };
+        Some(Ends {
+            ids: nodes.map(|node| node.0),
+            points: vertices.map(|vertex| self.scene.mesh.position(vertex)),
+            corners: [value(0)?, value(1)?, value(2)?],
+        })
     }
 
     /// Edges at split nodes whose value is not known yet. Two elements that share one would get the same; the lower one

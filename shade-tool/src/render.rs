@@ -7,75 +7,111 @@ use crate::interpolation::corner_weights;
 use crate::lit_scene::LitScene;
 use crate::nodes::NodeRadiosity;
 use crate::picture::Picture;
+use crate::refined::RefinedFacets;
 use crate::visible::{Seen, VisibleSurface};
 use interchange::ids::ElementId;
 use interchange::report::{Phase, Report};
 use interchange::tool::Common;
 use rayon::prelude::*;
 use std::f64::consts::FRAC_1_PI;
+use std::ops::Range;
 use std::time::Instant;
 
-/// The picture is made in bands of rows with about this many samples: 32 MB of what they see are kept at a time, and a
-/// picture of usual size is one or few bands, so that all nodes are gathered together.
+/// The picture is made in bands of rows with about this many samples: 32 MB of what they see are kept at a time.
 const SAMPLES_PER_BAND: usize = 1 << 20;
 
-/// Renders the scene with `samples` x `samples` samples to a pixel, and reports phases and counters.
+/// How a picture is sampled and how linear its facets must be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Quality {
+    /// Samples along each side of a pixel.
+    pub samples: usize,
+    /// Facets are cut while the middle of an edge is off the mean of its ends by more than this part of its value.
+    pub tolerance: f64,
+}
+
+/// Renders the scene, and reports phases and counters.
 pub fn render(
     scene: &LitScene,
     camera: &Camera,
-    samples: usize,
+    quality: Quality,
     common: &Common,
     report: &mut Report,
 ) -> Picture {
     let surface = report.phase("hierarchy", || VisibleSurface::new(scene));
     let mut nodes = report.phase("gatherer", || NodeRadiosity::new(scene));
     let [width, height] = camera.size.map(|n| n as usize);
-    let mut picture = Picture { width, height, pixels: Vec::with_capacity(width * height) };
-    let mut times = [("visible surface", 0.0), ("gather at nodes", 0.0), ("interpolation", 0.0)];
-    let mut clock = |phase: usize, start: Instant| times[phase].1 += start.elapsed().as_secs_f64();
-    let rows_per_band = (SAMPLES_PER_BAND / (width * samples * samples)).max(1);
+    let samples = quality.samples;
+    let per_pixel = samples * samples;
+    let rows_per_band = (SAMPLES_PER_BAND / (width * per_pixel)).max(1);
+    let bands: Vec<Range<usize>> =
+        (0..height).step_by(rows_per_band).map(|top| top..(top + rows_per_band).min(height)).collect();
+    let look = |band: &Range<usize>| -> Vec<Seen> {
+        let rows = band.clone().into_par_iter();
+        rows.flat_map_iter(|row| samples_of_row(&surface, camera, row, samples)).collect()
+    };
+
+    // Find what every sample sees, and so how many samples every facet has; a single band is kept for later.
+    let mut kept = None;
+    let mut seen_samples = vec![0u32; scene.mesh.element_count()];
+    report.phase("visible surface", || {
+        for band in &bands {
+            let seen = look(band);
+            count_samples(&seen, &mut seen_samples);
+            kept = (bands.len() == 1).then_some(seen);
+        }
+    });
+
+    // Gather at the nodes of the facets that are seen, and in between where radiosity is not linear.
+    let elements: Vec<ElementId> =
+        (0..seen_samples.len()).filter(|&k| seen_samples[k] > 0).map(ElementId::new).collect();
     let bar = common.progress("render", height);
-    for top in (0..height).step_by(rows_per_band) {
-        let band = top..(top + rows_per_band).min(height);
-
-        // Find what every sample sees.
-        let start = Instant::now();
-        let seen: Vec<Seen> = band
-            .clone()
-            .into_par_iter()
-            .flat_map_iter(|row| samples_of_row(&surface, camera, row, samples))
-            .collect();
-        count_unlit(&seen, report);
-        clock(0, start);
-
-        // Gather at the nodes of the elements that are seen.
-        let start = Instant::now();
-        let elements = seen_elements(scene.mesh.element_count(), &seen);
+    report.phase("gather at nodes", || {
         nodes.gather(&elements, |points| bar.inc_length(points as u64), || bar.inc(1));
-        clock(1, start);
+    });
+    let facets: Vec<(ElementId, f64)> =
+        elements.iter().map(|&e| (e, f64::from(seen_samples[e.index()]) / per_pixel as f64)).collect();
+    let refined = report.phase("gather in between", || {
+        RefinedFacets::new(&nodes, &surface, &facets, quality.tolerance, || bar.tick())
+    });
 
-        // Interpolate, and average over each pixel.
-        let start = Instant::now();
+    // Interpolate, and average over each pixel.
+    let mut picture = Picture { width, height, pixels: Vec::with_capacity(width * height) };
+    report.count("background_samples", 0);
+    report.count("back_face_samples", 0);
+    let start = Instant::now();
+    for band in &bands {
+        let seen = kept.take().unwrap_or_else(|| look(band));
+        count_unlit(&seen, report);
         let band_pixels: Vec<[f64; 3]> = seen
-            .par_chunks(samples * samples)
-            .map_init(Vec::new, |weights, seen| pixel(&surface, &nodes, seen, weights))
+            .par_chunks(per_pixel)
+            .map_init(Vec::new, |weights, seen| pixel(&surface, &nodes, &refined, seen, weights))
             .collect();
         picture.pixels.extend(band_pixels);
-        clock(2, start);
         bar.inc(band.len() as u64);
     }
+    report.phases.push(Phase { name: "interpolation".into(), seconds: start.elapsed().as_secs_f64() });
     bar.finish_and_clear();
-    report.phases.extend(times.map(|(name, seconds)| Phase { name: name.into(), seconds }));
-    report.count("samples", width * height * samples * samples);
+    report.count("samples", width * height * per_pixel);
     report.count("nodes_gathered", nodes.counts.whole);
     report.count("nodes_split", nodes.counts.split);
     report.count("node_edges_gathered", nodes.counts.edges);
     report.count("nodes_black_skipped", nodes.counts.black);
     report.count("nodes_unseen_skipped", nodes.counts.unseen);
+    report.count("points_gathered_in_between", refined.gathered);
+    report.count("facets_cut", refined.cut);
     for (channel, mean) in ["r", "g", "b"].iter().zip(picture.mean()) {
         report.estimate(&format!("mean_radiance_{channel}"), mean);
     }
     picture
+}
+
+/// Adds the samples of each facet.
+fn count_samples(seen: &[Seen], samples: &mut [u32]) {
+    for sample in seen {
+        if let Seen::Surface(element, _) = sample {
+            samples[element.index()] = samples[element.index()].saturating_add(1);
+        }
+    }
 }
 
 /// Samples of a row, pixel by pixel.
@@ -107,24 +143,22 @@ fn count_unlit(seen: &[Seen], report: &mut Report) {
     report.count("back_face_samples", seen.iter().filter(|s| **s == Seen::Back).count());
 }
 
-/// All elements that are seen, each once.
-fn seen_elements(elements: usize, seen: &[Seen]) -> Vec<ElementId> {
-    let mut is_seen = vec![false; elements];
-    for sample in seen {
-        if let Seen::Surface(element, _) = sample {
-            is_seen[element.index()] = true;
-        }
-    }
-    (0..elements).filter(|&element| is_seen[element]).map(ElementId::new).collect()
-}
-
 /// Mean radiance B / pi over the samples of a pixel.
-fn pixel(surface: &VisibleSurface, nodes: &NodeRadiosity, seen: &[Seen], weights: &mut Vec<f64>) -> [f64; 3] {
+fn pixel(
+    surface: &VisibleSurface,
+    nodes: &NodeRadiosity,
+    refined: &RefinedFacets,
+    seen: &[Seen],
+    weights: &mut Vec<f64>,
+) -> [f64; 3] {
     let mut sum = [0.0; 3];
     for sample in seen {
         let Seen::Surface(element, place) = *sample else { continue };
-        corner_weights(surface.corners(element), place, weights);
-        for (sum, b) in sum.iter_mut().zip(nodes.interpolate(element, weights)) {
+        let radiosity = refined.at(element, place, weights).unwrap_or_else(|| {
+            corner_weights(surface.corners(element), place, weights);
+            nodes.interpolate(element, weights)
+        });
+        for (sum, b) in sum.iter_mut().zip(radiosity) {
             *sum += b;
         }
     }
@@ -142,6 +176,10 @@ mod tests {
 
     fn quiet() -> Common {
         Common { threads: None, quiet: true, verbose: false }
+    }
+
+    fn fine(samples: usize) -> Quality {
+        Quality { samples, tolerance: 0.01 }
     }
 
     fn report() -> Report {
@@ -176,7 +214,7 @@ mod tests {
             let eye = DVec3::new(0.3, 0.4, 0.2);
             let camera = Camera::new(eye, DVec3::ONE, DVec3::Y, Lens::Vertical(100.0), [16, 12]).unwrap();
             let mut report = report();
-            let picture = render(&scene, &camera, 3, &quiet(), &mut report);
+            let picture = render(&scene, &camera, fine(3), &quiet(), &mut report);
             assert_eq!(picture.pixels.len(), 16 * 12);
             for value in picture.pixels.iter().flatten() {
                 assert!((value - FRAC_1_PI).abs() < 1e-9, "{value}");
@@ -195,7 +233,7 @@ mod tests {
         let scene = cube(2);
         let camera = Camera::framing(scene.bounds(), DVec3::Y, Lens::Vertical(40.0), [32, 32]).unwrap();
         let mut framed = report();
-        let picture = render(&scene, &camera, 2, &quiet(), &mut framed);
+        let picture = render(&scene, &camera, fine(2), &quiet(), &mut framed);
         assert_eq!(framed.counters["back_face_samples"], 0);
         assert!(framed.counters["background_samples"] > 100);
         assert!((picture.pixels[16 * 32 + 16][0] - FRAC_1_PI).abs() < 1e-9);
@@ -203,7 +241,7 @@ mod tests {
 
         let placed = Camera { framing: false, ..camera };
         let mut seen = report();
-        let picture = render(&scene, &placed, 2, &quiet(), &mut seen);
+        let picture = render(&scene, &placed, fine(2), &quiet(), &mut seen);
         assert_eq!(seen.counters["background_samples"], framed.counters["background_samples"]);
         assert_eq!(seen.counters["background_samples"] + seen.counters["back_face_samples"], 4 * 32 * 32);
         assert!(picture.pixels.iter().all(|p| *p == [0.0; 3]));
@@ -220,7 +258,7 @@ mod tests {
         for z in [1.0, -1.0] {
             let (eye, at) = (DVec3::new(0.5, 0.5, z), DVec3::new(0.5, 0.5, 0.0));
             let camera = Camera::new(eye, at, DVec3::Y, Lens::Vertical(10.0), [4, 4]).unwrap();
-            let picture = render(&scene, &camera, 1, &quiet(), &mut report());
+            let picture = render(&scene, &camera, fine(1), &quiet(), &mut report());
             for (got, want) in picture.pixels.iter().flat_map(|p| p.iter().zip([1.0, 2.0, 3.0])) {
                 assert!((got - want).abs() < 1e-12, "{got}, want {want}");
             }
@@ -239,7 +277,7 @@ mod tests {
         let above = DVec3::new(0.5, 1.0, 0.5);
         let camera =
             Camera::new(above, DVec3::new(0.5, 0.0, 0.5), DVec3::Z, Lens::Vertical(90.0), [9, 9]).unwrap();
-        let picture = render(&scene, &camera, 1, &quiet(), &mut report());
+        let picture = render(&scene, &camera, fine(1), &quiet(), &mut report());
         // The mean value coordinates of a square are symmetric: its middle is the mean of its four corners.
         let far = (1f64.atan() - 0.5f64.sqrt() * 0.5f64.sqrt().atan()) / std::f64::consts::TAU;
         let want = 0.5 * (0.375 + far) * FRAC_1_PI;
