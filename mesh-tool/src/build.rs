@@ -6,9 +6,11 @@ use crate::contact::Pieces;
 use crate::convex::pieces_of_polygon;
 use crate::frame::Frame;
 use crate::given::as_given;
+use crate::light::Light;
 use crate::meshed::Drawing;
 use crate::patch::Patch;
 use crate::sheets::{Layer, layers};
+use crate::sized::sized;
 use crate::triangulation::Trouble;
 use geometry::plane::PLANARITY;
 use geometry::polygon;
@@ -22,23 +24,12 @@ use interchange::tables::number;
 use interchange::{Error, Result};
 use rayon::prelude::*;
 
-/// Area of an equilateral triangle of edge 1.
-const EQUILATERAL: f64 = 0.433_012_701_892_219_3;
-/// Spacing wished where no edge may be longer than 1: smoothed lattices stretch single edges by about a fifth.
-const SPACING_PER_MAX_EDGE: f64 = 0.8;
-/// The search for the spacing that gives the asked number of elements ends within this part of it, ...
-const COUNT_TOLERANCE: f64 = 0.04;
-/// ... or after this many trials: the count falls with the square of the spacing, so that two or three are usual.
-const COUNT_TRIALS: usize = 8;
-/// More elements than this are refused: their matrix could not be stored.
-const MOST_ELEMENTS: f64 = 20e6;
-
 /// What the elements should be. With neither, the faces are elements as given; with both, the finer wins.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Options {
     /// No edge longer than this, in units of the scene.
     pub max_edge: Option<f64>,
-    /// About this many elements in the whole scene, of equal area.
+    /// About this many elements in the whole scene, small where light changes; without emitters of equal area.
     pub elements: Option<u32>,
 }
 
@@ -84,7 +75,8 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
             .collect::<Result<_>>()?;
         note(report, "lines", start);
         let start = std::time::Instant::now();
-        let meshes = sized(scene, &drawings, options, report, &name)?;
+        let light = options.elements.and_then(|_| Light::new(&cleaned, &pieces));
+        let meshes = sized(scene, &drawings, light.as_ref(), options, report, &name)?;
         patches = drawings.iter().map(Drawing::layer).zip(meshes).collect();
         note(report, "triangulate", start);
     } else {
@@ -134,83 +126,6 @@ fn convex_pieces_of_faces(scene: &Scene, cleaned: &Cleaned) -> Result<Pieces> {
                 .map_err(|trouble| trouble.at(scene, face.line))
         })
         .collect()
-}
-
-/// Meshes all layers with the spacing that the options ask for.
-fn sized(
-    scene: &Scene,
-    drawings: &[Drawing],
-    options: &Options,
-    report: &mut Report,
-    name: &(impl Fn(u32, Trouble) -> Error + Sync),
-) -> Result<Vec<Patch>> {
-    let area: f64 = drawings.iter().map(|drawing| drawing.area).sum();
-    let max_edge = options.max_edge.unwrap_or(f64::INFINITY);
-    let mesh = |spacing: f64| -> Result<(Vec<Patch>, f64)> {
-        let expected = area / (EQUILATERAL * spacing * spacing);
-        if expected > MOST_ELEMENTS {
-            return Err(Error::whole(
-                &scene.path,
-                format!(
-                    "about {expected:.1e} elements would be needed, more than {MOST_ELEMENTS:.0e}; raise --max-edge"
-                ),
-            ));
-        }
-        let patches: Vec<Patch> = drawings
-            .par_iter()
-            .map(|drawing| {
-                let mesh = drawing.mesh(spacing, max_edge);
-                mesh.map_err(|trouble| name(drawing.layer().sheets[0].face, trouble))
-            })
-            .collect::<Result<_>>()?;
-        let count: usize = patches.iter().map(|patch| patch.elements.len()).sum();
-        Ok((patches, count as f64))
-    };
-    let widest = SPACING_PER_MAX_EDGE * max_edge;
-    let Some(wanted) = options.elements.map(f64::from) else { return Ok(mesh(widest)?.0) };
-
-    // The count goes with the inverse square of the spacing, apart from what the faces need at least.
-    let mut spacing = (area / (EQUILATERAL * wanted)).sqrt().min(widest);
-    let (mut patches, mut count) = mesh(spacing)?;
-    let mut bracket = (0.0, f64::INFINITY);
-    for _ in 0..COUNT_TRIALS {
-        let too_many = count > wanted;
-        if (count / wanted - 1.0).abs() <= COUNT_TOLERANCE || (!too_many && spacing >= widest) {
-            break;
-        }
-        if too_many {
-            bracket.0 = spacing
-        } else {
-            bracket.1 = spacing
-        }
-        // Within the bracket where there is one: the count has steps.
-        let guess = spacing * (count / wanted).sqrt().clamp(0.25, 4.0);
-        let inside = guess > bracket.0 && guess < bracket.1;
-        let next = if inside || bracket.1.is_infinite() || bracket.0 == 0.0 {
-            guess
-        } else {
-            (bracket.0 * bracket.1).sqrt()
-        };
-        let next = next.min(widest);
-        let (other, other_count) = mesh(next)?;
-        let closer = (other_count / wanted).ln().abs() < (count / wanted).ln().abs();
-        let stuck = other_count == count && next > spacing;
-        spacing = next;
-        if closer {
-            patches = other;
-        }
-        if stuck {
-            break;
-        }
-        count = other_count;
-    }
-    let count: usize = patches.iter().map(|patch| patch.elements.len()).sum();
-    if count as f64 > 1.15 * wanted {
-        report.warn(format!(
-            "the faces and lines need at least about {count} elements, more than the {wanted} asked for"
-        ));
-    }
-    Ok(patches)
 }
 
 /// Counts and measures the finished mesh.

@@ -2,7 +2,8 @@
 //!
 //! The way of a scene: [`clean`] welds and drops, [`sheets`] finds what lies in one plane and looks the same way,
 //! [`contact`] where other faces stand on it or poke through it; then either [`given`] leaves the faces as they are, or
-//! [`meshed`] triangulates each plane as a whole ([`planar`], [`triangulation`], [`seeds`], [`refine`]); [`assemble`]
+//! [`meshed`] triangulates each plane as a whole ([`planar`], [`triangulation`], [`seeds`], [`refine`]), with smaller triangles where
+//! light changes ([`light`], [`lit`]; [`sized`] keeps the count); [`assemble`]
 //! numbers elements ([`cluster`]) and nodes ([`nodes`]).
 //!
 //! # Limitations
@@ -22,6 +23,8 @@ pub mod depfile;
 pub mod frame;
 pub mod given;
 pub mod info;
+pub mod light;
+pub mod lit;
 pub mod meshed;
 pub mod nodes;
 pub mod patch;
@@ -30,6 +33,7 @@ pub mod planar;
 pub mod refine;
 pub mod seeds;
 pub mod sheets;
+pub mod sized;
 pub mod triangulation;
 
 pub use build::{Options, build, provenance};

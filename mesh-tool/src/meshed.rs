@@ -11,10 +11,34 @@ use crate::seeds::lattice;
 use crate::sheets::Layer;
 use crate::triangulation::{Triangulation, Trouble};
 use geometry::polygon;
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 /// Edges of the graph may be longer than the spacing by this part before they are split once more.
 const SLACK: f64 = 0.2;
+
+/// A layer in triangles that can be refined further.
+#[derive(Debug)]
+pub struct Triangles {
+    refinement: Refinement,
+    triangulation: Triangulation,
+    /// Sheet that holds each triangle; triangles without one are not part of the scene.
+    winners: Vec<Option<u32>>,
+}
+
+impl Triangles {
+    /// Number of triangles that become elements.
+    pub fn count(&self) -> usize {
+        self.winners.iter().flatten().count()
+    }
+
+    /// The triangles that become elements: number and corners, counter-clockwise in the layer's frame.
+    pub fn elements(&self) -> impl Iterator<Item = (usize, [DVec3; 3])> + '_ {
+        let corners = |t: usize| {
+            self.triangulation.triangles[t].corners.map(|p| self.refinement.graph.points[p as usize].position)
+        };
+        (0..self.winners.len()).filter(|&t| self.winners[t].is_some()).map(move |t| (t, corners(t)))
+    }
+}
 
 /// A layer ready to be meshed at any size: everything that does not depend on the size is done.
 #[derive(Debug)]
@@ -75,29 +99,47 @@ impl Drawing {
         &self.layer
     }
 
-    /// Elements with edges of about `spacing` and none longer than `max_edge`, both in units of length.
-    pub fn mesh(&self, spacing: f64, max_edge: f64) -> Result<Patch, Trouble> {
+    /// Triangles with edges of about `spacing` and none longer than `max_edge`, both in units of length.
+    pub fn mesh(&self, spacing: f64, max_edge: f64) -> Result<Triangles, Trouble> {
         let target =
             Target { spacing: spacing / self.layer.frame.size, max_edge: max_edge / self.layer.frame.size };
         let mut graph = self.graph.clone();
         graph.divide(|length| (length / target.spacing - SLACK).ceil().max(1.0) as usize);
         let seeds = lattice(&graph, &self.rings, target.spacing);
-        let (mut graph, free, triangulation) = Refinement::new(graph, &seeds, target).run()?;
-        for (point, free) in graph.points.iter_mut().zip(free) {
-            if free {
+        let mut refinement = Refinement::new(graph, &seeds, target);
+        let triangulation = refinement.run()?;
+        Ok(self.owned(refinement, triangulation))
+    }
+
+    /// Halves the edges of the triangles `marked` (by their number in `triangles`) that are at least twice as long
+    /// as `shortest`, in units of length. `false` where there are none.
+    pub fn halve(&self, triangles: &mut Triangles, marked: &[usize], shortest: f64) -> Result<bool, Trouble> {
+        let shortest = shortest / self.layer.frame.size;
+        let halved = triangles.refinement.halve_triangles(&triangles.triangulation, marked, shortest)?;
+        let Some(triangulation) = halved else { return Ok(false) };
+        let refinement = triangles.refinement.clone();
+        *triangles = self.owned(refinement, triangulation);
+        Ok(true)
+    }
+
+    /// Finds the sheet that holds each triangle, and the places of the points that moved.
+    fn owned(&self, mut refinement: Refinement, triangulation: Triangulation) -> Triangles {
+        for (point, free) in refinement.graph.points.iter_mut().zip(&refinement.free) {
+            if *free {
                 point.position = self.layer.frame.lift(point.uv);
             }
         }
-        Ok(self.patch(&graph, &triangulation))
-    }
-
-    /// Gives every triangle to the sheet that holds it.
-    fn patch(&self, graph: &PlanarGraph, triangulation: &Triangulation) -> Patch {
         let winner = |t: usize| {
             let holders = triangulation.sheets(t).filter(|&(_, winding)| winding > 0).map(|(sheet, _)| sheet);
             self.layer.winner(holders)
         };
-        let winners: Vec<Option<u32>> = (0..triangulation.triangles.len()).map(winner).collect();
+        let winners = (0..triangulation.triangles.len()).map(winner).collect();
+        Triangles { refinement, triangulation, winners }
+    }
+
+    /// The elements.
+    pub fn patch(&self, triangles: &Triangles) -> Patch {
+        let Triangles { refinement: Refinement { graph, .. }, triangulation, winners } = triangles;
         let mut patch = Patch {
             points: graph.points.clone(),
             contacts: self.contacts,

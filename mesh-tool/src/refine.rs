@@ -10,12 +10,15 @@ use crate::frame::turn;
 use crate::planar::PlanarGraph;
 use crate::triangulation::{Triangle, Triangulation, Trouble};
 use glam::DVec2;
+use std::collections::BTreeSet;
 
 /// Triangles with a smaller angle are refined, in degrees. Ruppert's bound for termination is 20.7; the floor on the
 /// edge length ends the rest.
 const SMALLEST_ANGLE: f64 = 24.0;
 /// No edge is halved, and no point put closer to another, below this part of the spacing.
 const FLOOR: f64 = 0.15;
+/// Of a triangle to be made smaller all edges at least this part of the longest are halved: a strip stays one wide.
+const LONG: f64 = 0.6;
 /// Rounds of adding points; each settles most of what the one before left.
 const ROUNDS: usize = 12;
 /// Rounds of smoothing before and after.
@@ -33,12 +36,14 @@ pub struct Target {
 }
 
 /// A graph with points that may move.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Refinement {
     /// Points and edges.
     pub graph: PlanarGraph,
     /// Whether each point may move: it is on no edge.
     pub free: Vec<bool>,
+    /// Wished length of the edges around each point, in units of the frame.
+    sizes: Vec<f64>,
     target: Target,
 }
 
@@ -57,14 +62,15 @@ impl Refinement {
             add_free(&mut graph, uv);
             free.push(true);
         }
-        Self { graph, free, target }
+        let sizes = vec![target.spacing; graph.points.len()];
+        Self { graph, free, sizes, target }
     }
 
     /// Smooths and refines. Returns the last triangulation.
-    pub fn run(mut self) -> Result<(PlanarGraph, Vec<bool>, Triangulation), Trouble> {
+    pub fn run(&mut self) -> Result<Triangulation, Trouble> {
         for _ in 0..SMOOTHING {
             let triangulation = self.graph.triangulate()?;
-            self.smooth(&triangulation);
+            self.smooth(&triangulation, 0);
         }
         let limit = self.graph.points.len() * 4 + 256;
         let mut triangulation = self.graph.triangulate()?;
@@ -75,7 +81,7 @@ impl Refinement {
             }
             self.apply(&changes);
             triangulation = self.graph.triangulate()?;
-            self.smooth(&triangulation);
+            self.smooth(&triangulation, 0);
             triangulation = self.graph.triangulate()?;
         }
         for _ in 0..LENGTH_ROUNDS {
@@ -86,7 +92,46 @@ impl Refinement {
             self.apply(&changes);
             triangulation = self.graph.triangulate()?;
         }
-        Ok((self.graph, self.free, triangulation))
+        Ok(triangulation)
+    }
+
+    /// Halves the long edges of the `marked` triangles, in units of the frame down to `shortest`, and widens the small
+    /// angles that this leaves around them. `None` where nothing can be halved.
+    pub fn halve_triangles(
+        &mut self,
+        triangulation: &Triangulation,
+        marked: &[usize],
+        shortest: f64,
+    ) -> Result<Option<Triangulation>, Trouble> {
+        let (mut seen, mut changes) = (BTreeSet::new(), Vec::new());
+        for &t in marked {
+            let triangle = &triangulation.triangles[t];
+            let longest = self.shape(triangle).longest;
+            for k in 0..3 {
+                let (a, b) = (triangle.corners[k], triangle.corners[(k + 1) % 3]);
+                let length = self.uv(a).distance(self.uv(b));
+                if length >= (LONG * longest).max(2.0 * shortest) && seen.insert((a.min(b), a.max(b))) {
+                    changes.push((self.middle(triangle, k), 0.5 * length));
+                }
+            }
+        }
+        if changes.is_empty() {
+            return Ok(None);
+        }
+        let first_new = self.graph.points.len();
+        self.apply(&changes);
+        let mut triangulation = self.graph.triangulate()?;
+        for _ in 0..ROUNDS {
+            self.smooth(&triangulation, first_new);
+            triangulation = self.graph.triangulate()?;
+            let changes = self.wished_changes(&triangulation);
+            if changes.is_empty() {
+                break;
+            }
+            self.apply(&changes);
+            triangulation = self.graph.triangulate()?;
+        }
+        Ok(Some(triangulation))
     }
 
     fn uv(&self, point: u32) -> DVec2 {
@@ -95,12 +140,12 @@ impl Refinement {
 
     /// Moves every free point to the mean of the centroids of the triangles around it, weighted by their areas
     /// (a step towards a centroidal triangulation), unless a triangle would turn over. No point can leave the
-    /// triangles around it, so none crosses an edge of the graph.
-    fn smooth(&mut self, triangulation: &Triangulation) {
+    /// triangles around it, so none crosses an edge of the graph. Points before `first` stay.
+    fn smooth(&mut self, triangulation: &Triangulation, first: usize) {
         let mut around: Vec<Vec<u32>> = vec![Vec::new(); self.graph.points.len()];
         for (t, triangle) in triangulation.triangles.iter().enumerate() {
             for corner in triangle.corners {
-                if self.free[corner as usize] {
+                if self.free[corner as usize] && corner as usize >= first {
                     around[corner as usize].push(t as u32);
                 }
             }
@@ -132,33 +177,34 @@ impl Refinement {
 
     /// Changes for triangles with too small angles or too long edges: the worst first, and none so close to another
     /// that both would serve the same place.
-    fn wished_changes(&self, triangulation: &Triangulation) -> Vec<Change> {
-        let floor = FLOOR * self.target.spacing;
+    fn wished_changes(&self, triangulation: &Triangulation) -> Vec<(Change, f64)> {
         let mut wishes = Vec::new();
         for (t, triangle) in triangulation.triangles.iter().enumerate() {
             if triangulation.sheets(t).next().is_none() {
                 continue;
             }
             let shape = self.shape(triangle);
+            let size = triangle.corners.iter().map(|&p| self.sizes[p as usize]).fold(f64::INFINITY, f64::min);
+            let floor = FLOOR * size;
             // A strip thinner than this would need edges below the floor; halving its sides would be in vain.
             let in_strip = shape.height < floor * SMALLEST_ANGLE.to_radians().sin()
                 && triangle.corners.iter().all(|&corner| !self.free[corner as usize]);
             if shape.longest > self.target.max_edge {
                 let change = self.middle(triangle, shape.longest_edge);
-                wishes.push((0.0, change, 0.5 * shape.longest));
+                wishes.push((0.0, (change, size), 0.5 * shape.longest));
             } else if shape.smallest_angle < SMALLEST_ANGLE.to_radians()
                 && !shape.given_angle
                 && !in_strip
                 && let Some((change, clearance)) = self.better_point(triangulation, t, floor)
             {
-                wishes.push((shape.smallest_angle, change, clearance));
+                wishes.push((shape.smallest_angle, (change, size), clearance));
             }
         }
         wishes.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut taken: Vec<(DVec2, f64)> = Vec::new();
         let mut changes = Vec::new();
         for (_, change, clearance) in wishes {
-            let at = match change {
+            let at = match change.0 {
                 Change::Add(uv) => uv,
                 Change::Halve(edge) => {
                     let edge = &self.graph.edges[edge as usize];
@@ -215,7 +261,7 @@ impl Refinement {
 
     /// Points in the middle of edges that are too long; only of edges that are the longest of each triangle beside
     /// them, so that no triangle is split twice in one round and the longest of all is always among them.
-    fn halvings(&self, triangulation: &Triangulation) -> Vec<Change> {
+    fn halvings(&self, triangulation: &Triangulation) -> Vec<(Change, f64)> {
         let inside = |t: u32| triangulation.sheets(t as usize).next().is_some();
         let mut changes = Vec::new();
         for (t, triangle) in triangulation.triangles.iter().enumerate().filter(|(t, _)| inside(*t as u32)) {
@@ -235,11 +281,11 @@ impl Refinement {
                     })
             });
             if own {
-                changes.push(self.middle(triangle, k));
+                changes.push((self.middle(triangle, k), self.target.spacing));
             }
         }
         let mut seen = std::collections::HashSet::new();
-        changes.retain(|change| match change {
+        changes.retain(|(change, _)| match change {
             Change::Halve(edge) => seen.insert(*edge),
             Change::Add(_) => true,
         });
@@ -256,9 +302,11 @@ impl Refinement {
         }
     }
 
-    fn apply(&mut self, changes: &[Change]) {
-        for change in changes {
-            match *change {
+    /// Makes changes, each with the size at its new point.
+    fn apply(&mut self, changes: &[(Change, f64)]) {
+        for &(change, size) in changes {
+            self.sizes.push(size);
+            match change {
                 Change::Halve(edge) => {
                     self.graph.halve(edge as usize);
                     self.free.push(false);
