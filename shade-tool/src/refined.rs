@@ -246,7 +246,8 @@ impl Piece {
             let (before, after) = (weights[(k + 2) % 3], weights[(k + 1) % 3]);
             let turned = if before + after > 0.0 { after / (before + after) } else { 0.5 };
             for (channel, sum) in sum.iter_mut().enumerate() {
-                *sum += weights[k] * ((1.0 - turned) * corner.before[channel] + turned * corner.after[channel]);
+                *sum +=
+                    weights[k] * ((1.0 - turned) * corner.before[channel] + turned * corner.after[channel]);
             }
         }
         sum
