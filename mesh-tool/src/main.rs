@@ -1,11 +1,11 @@
 //! Command line of mesh-tool.
 
 use clap::{Args, Parser, Subcommand};
+use interchange::atomic_write;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
 use interchange::scene::Scene;
 use interchange::tool::{self, Common, Finish};
-use interchange::{Error, atomic_write};
 use mesh_tool::{NAME, Options, VERSION, depfile, info};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -127,17 +127,6 @@ fn write_materials(scene: &Scene, path: &Path) -> interchange::Result<()> {
     Ok(())
 }
 
-/// A slip like `-o scene.obj` must not cost the user the scene.
 fn refuse_overwriting(scene: &Scene, output: &Path) -> interchange::Result<()> {
-    let same = |file: &PathBuf| match (file.canonicalize(), output.canonicalize()) {
-        (Ok(a), Ok(b)) => a == b,
-        _ => false,
-    };
-    if depfile::dependencies(scene).iter().any(same) {
-        return Err(Error::whole(
-            output,
-            "this is an input of the scene; choose another name for the output",
-        ));
-    }
-    Ok(())
+    atomic_write::refuse_input(output, depfile::dependencies(scene).iter().map(PathBuf::as_path))
 }

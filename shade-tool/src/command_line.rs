@@ -9,6 +9,7 @@ use crate::{TOOL, VERSION, info, points, preview, probe, render};
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use glam::DVec3;
+use interchange::atomic_write::refuse_input;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
 use interchange::scene::Settings;
@@ -202,6 +203,10 @@ fn warn_of_range(picture: &Picture, precision: Precision, report: &mut Report) {
 }
 
 fn run_probe(arguments: &ProbeArguments, common: &Common) -> Result<()> {
+    refuse_input(
+        &arguments.output,
+        [arguments.points.as_path(), &arguments.scene.solution, &arguments.scene.mesh],
+    )?;
     let mut report = Report::new(TOOL, VERSION);
     let points = points::read(&arguments.points)?;
     let scene = read_scene(&arguments.scene, &mut report)?;
