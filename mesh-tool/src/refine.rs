@@ -184,7 +184,7 @@ impl Refinement {
                 continue;
             }
             let shape = self.shape(triangle);
-            let size = triangle.corners.iter().map(|&p| self.sizes[p as usize]).fold(f64::INFINITY, f64::min);
+            let size = triangle.corners.iter().map(|&p| self.sizes[p as usize]).fold(0.0, f64::max);
             let floor = FLOOR * size;
             // A strip thinner than this would need edges below the floor; halving its sides would be in vain.
             let in_strip = shape.height < floor * SMALLEST_ANGLE.to_radians().sin()
