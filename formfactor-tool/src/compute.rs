@@ -7,6 +7,7 @@ use geometry::pair::Accuracy;
 use geometry::patch::Patch;
 use geometry::sides::SideBits;
 use glam::DVec3;
+use interchange::atomic_write::refuse_input;
 use interchange::digest::Digest;
 use interchange::ids::ElementId;
 use interchange::matrix::{self, Block, BlockKind, MatrixRecord, Precision, Values};
@@ -44,6 +45,7 @@ pub struct Request {
 
 /// Computes the matrix of a mesh and writes it with its report.
 pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
+    refuse_input(&request.output, [request.mesh.as_path()])?;
     let mut report = Report::new("formfactor-tool", env!("CARGO_PKG_VERSION"));
     report.flags.push(format!("--tolerance {}", request.tolerance));
     let (mesh, _, digest) = report.phase("read", || Mesh::read(&request.mesh))?;

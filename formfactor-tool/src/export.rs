@@ -4,7 +4,7 @@
 //! sum of S over the elements of both, divided by the area of i. Both sides of a two-sided face count as one face,
 //! their areas summed. Rows are made in bands, so that a table of many elements needs no memory of its size.
 
-use interchange::atomic_write;
+use interchange::atomic_write::{self, refuse_input};
 use interchange::error::{Error, Result};
 use interchange::grouping::{By, Grouping};
 use interchange::matrix::{Block, BlockKind, Matrix, Values};
@@ -21,6 +21,7 @@ const BAND_ENTRIES: usize = 1 << 24;
 /// `.mtx` as MatrixMarket coordinates of the entries above 0.
 pub fn run(matrix_path: &Path, mesh_path: &Path, by: By, output: &Path) -> Result<()> {
     let format = TableFormat::of(output, &[TableFormat::Csv, TableFormat::Npy, TableFormat::Mtx])?;
+    refuse_input(output, [matrix_path, mesh_path])?;
     let (mesh, _, digest) = Mesh::read(mesh_path)?;
     let matrix = Matrix::open(matrix_path)?;
     matrix.belongs_to(mesh_path, digest, mesh.element_count())?;

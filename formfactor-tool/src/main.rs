@@ -3,13 +3,13 @@
 use clap::{Parser, Subcommand, ValueEnum};
 use formfactor_tool::{compute, export, info};
 use interchange::grouping::By;
-use interchange::tool::{Common, Finish, exit_code, print_data};
+use interchange::tool::{Common, EXIT_CODES, Finish, exit_code, print_data};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Exchange matrix S = diag(A) F of a mesh, occlusion included
 #[derive(Debug, Parser)]
-#[command(name = "formfactor-tool", version)]
+#[command(name = "formfactor-tool", version, after_help = EXIT_CODES)]
 struct Cli {
     #[command(subcommand)]
     command: Command,

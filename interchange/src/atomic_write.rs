@@ -15,6 +15,18 @@ pub enum Outcome {
     Unchanged,
 }
 
+/// Refuses an output that is one of the `inputs`: a slip like `-o scene.obj` must not cost the user the scene.
+///
+/// # Errors
+/// Names the output, where another way to write the same file counts as the same.
+pub fn refuse_input<'a>(output: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> Result<()> {
+    let Ok(place) = output.canonicalize() else { return Ok(()) };
+    if inputs.into_iter().any(|input| input.canonicalize().is_ok_and(|input| input == place)) {
+        return Err(Error::whole(output, "this file is an input; choose another name for the output"));
+    }
+    Ok(())
+}
+
 /// Writes what `fill` produces to `path`. On any error the old file is untouched.
 pub fn write(path: &Path, fill: impl FnOnce(&mut dyn WriteSeek) -> std::io::Result<()>) -> Result<Outcome> {
     let io = |action| move |e| Error::io(path, action, e);

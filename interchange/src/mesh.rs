@@ -67,8 +67,8 @@ pub struct Mesh {
     pub element_faces: Vec<FaceId>,
     /// 0: the element looks where its face looks; 1: it is the back of a two-sided face.
     pub element_sides: Vec<u32>,
-    /// Vertex of each node. Nodes are shared by the elements of one face side that meet there without a value
-    /// discontinuity between them.
+    /// Vertex of each node. Nodes are shared by elements that meet along edges without a value discontinuity: those in
+    /// one plane that look the same way and have the same material, be they of one face or of several.
     pub node_vertices: Vec<VertexId>,
     /// Corners of each planar face: simple polygons, counter-clockwise seen from the front. They block light.
     pub faces: Ragged<VertexId>,

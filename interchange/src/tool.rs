@@ -7,6 +7,19 @@ use std::fmt::Display;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 
+/// Line at the end of each tool's `--help`.
+pub const EXIT_CODES: &str =
+    "Exit codes: 0 done, 1 failed, 2 bad usage, 3 written, but the asked tolerance was not reached.";
+
+/// Value of a flag that is a finite number above 0.
+///
+/// # Errors
+/// What was expected, for clap, which names the flag and what was given.
+pub fn positive(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse().ok().filter(|&number: &f64| number.is_finite() && number > 0.0);
+    number.ok_or_else(|| "expected a number above 0".into())
+}
+
 /// Flags every subcommand takes. None of them changes an output.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Common {

@@ -1,26 +1,24 @@
 //! Command line of mesh-tool.
 
 use clap::{Args, Parser, Subcommand};
+use interchange::atomic_write;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
 use interchange::scene::Scene;
 use interchange::tool::{self, Common, Finish};
-use interchange::{Error, atomic_write};
 use mesh_tool::{NAME, Options, VERSION, depfile, info};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Turns a scene into elements
 #[derive(Debug, Parser)]
-#[command(name = "mesh-tool", version, about, after_help = EXIT_CODES)]
+#[command(name = "mesh-tool", version, about, after_help = tool::EXIT_CODES)]
 struct CommandLine {
     #[command(subcommand)]
     command: Command,
     #[command(flatten)]
     common: Common,
 }
-
-const EXIT_CODES: &str = "Exit codes: 0 done, 1 failed, 2 bad usage.";
 
 #[derive(Debug, Subcommand)]
 enum Command {
@@ -46,9 +44,9 @@ enum Command {
         #[arg(short, long, value_name = "FILE")]
         output: PathBuf,
         /// Mesh with triangles whose edges are no longer than this, in the scene's unit of length
-        #[arg(long, value_name = "L", value_parser = positive)]
+        #[arg(long, value_name = "L", value_parser = tool::positive)]
         max_edge: Option<f64>,
-        /// Mesh with about this many triangles, small where light changes; with --max-edge too, the finer of the two wins
+        /// Mesh with about this many triangles, smaller where light changes; with --max-edge too, the finer of the two wins
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
         elements: Option<u32>,
     },
@@ -75,11 +73,6 @@ impl SceneArgs {
     fn read(&self) -> interchange::Result<Scene> {
         Scene::read(&self.scene, &self.two_sided)
     }
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    let length: f64 = text.parse().map_err(|_| "a length is a number".to_owned())?;
-    if length.is_finite() && length > 0.0 { Ok(length) } else { Err("a length is finite and above 0".into()) }
 }
 
 fn main() -> ExitCode {
@@ -134,17 +127,6 @@ fn write_materials(scene: &Scene, path: &Path) -> interchange::Result<()> {
     Ok(())
 }
 
-/// A slip like `-o scene.obj` must not cost the user the scene.
 fn refuse_overwriting(scene: &Scene, output: &Path) -> interchange::Result<()> {
-    let same = |file: &PathBuf| match (file.canonicalize(), output.canonicalize()) {
-        (Ok(a), Ok(b)) => a == b,
-        _ => false,
-    };
-    if depfile::dependencies(scene).iter().any(same) {
-        return Err(Error::whole(
-            output,
-            "this is an input of the scene; choose another name for the output",
-        ));
-    }
-    Ok(())
+    atomic_write::refuse_input(output, depfile::dependencies(scene).iter().map(PathBuf::as_path))
 }

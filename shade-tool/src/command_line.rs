@@ -9,10 +9,11 @@ use crate::{TOOL, VERSION, info, points, preview, probe, render};
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use glam::DVec3;
+use interchange::atomic_write::refuse_input;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
 use interchange::scene::Settings;
-use interchange::tool::{Common, Finish, print_data};
+use interchange::tool::{Common, EXIT_CODES, Finish, positive, print_data};
 use std::path::{Path, PathBuf};
 
 /// Largest picture side: 2^16 pixels, beyond any display or print.
@@ -22,7 +23,7 @@ const LARGEST_PICTURE: u64 = 1 << 28;
 
 /// Radiosity to pictures and points.
 #[derive(Debug, Parser)]
-#[command(name = TOOL, version, about, after_help = "Exit: 0 done, 1 failed, 2 bad usage.")]
+#[command(name = TOOL, version, about, after_help = EXIT_CODES)]
 pub struct Arguments {
     /// Flags of all tools.
     #[command(flatten)]
@@ -202,6 +203,10 @@ fn warn_of_range(picture: &Picture, precision: Precision, report: &mut Report) {
 }
 
 fn run_probe(arguments: &ProbeArguments, common: &Common) -> Result<()> {
+    refuse_input(
+        &arguments.output,
+        [arguments.points.as_path(), &arguments.scene.solution, &arguments.scene.mesh],
+    )?;
     let mut report = Report::new(TOOL, VERSION);
     let points = points::read(&arguments.points)?;
     let scene = read_scene(&arguments.scene, &mut report)?;
@@ -264,11 +269,6 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
 
 fn vector(text: &str) -> Result<DVec3, String> {
     numbers(text).map(DVec3::from_array)
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    let [x] = numbers(text)?;
-    if x > 0.0 { Ok(x) } else { Err("expected a number above 0".into()) }
 }
 
 fn film(text: &str) -> Result<[f64; 2], String> {

@@ -245,8 +245,9 @@ impl Piece {
         for (k, corner) in self.corners.iter().enumerate() {
             let (before, after) = (weights[(k + 2) % 3], weights[(k + 1) % 3]);
             let turned = if before + after > 0.0 { after / (before + after) } else { 0.5 };
-            for c in 0..3 {
-                sum[c] += weights[k] * ((1.0 - turned) * corner.before[c] + turned * corner.after[c]);
+            for (channel, sum) in sum.iter_mut().enumerate() {
+                *sum +=
+                    weights[k] * ((1.0 - turned) * corner.before[channel] + turned * corner.after[channel]);
             }
         }
         sum

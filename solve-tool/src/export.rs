@@ -1,5 +1,6 @@
 //! `solve-tool export`: radiosity and irradiance as tables, area-weighted means per element, face or group.
 
+use interchange::atomic_write::refuse_input;
 use interchange::grouping::{By, Grouping};
 use interchange::mesh::Mesh;
 use interchange::solution::Solution;
@@ -15,6 +16,7 @@ const COLUMNS: [&str; 7] = ["area", "B_r", "B_g", "B_b", "H_r", "H_g", "H_b"];
 /// Keys without elements (faces that were dropped) have area 0 and zeros.
 pub fn run(solution_path: &Path, mesh_path: &Path, by: By, output: &Path) -> interchange::Result<()> {
     let format = TableFormat::of(output, &[TableFormat::Csv, TableFormat::Npy])?;
+    refuse_input(output, [solution_path, mesh_path])?;
     let (mesh, _, mesh_digest) = Mesh::read(mesh_path)?;
     let (solution, _, origins, _) = Solution::read(solution_path)?;
     Solution::belongs_to(solution_path, &origins, mesh_path, mesh_digest)?;

@@ -1,10 +1,8 @@
-//! solve-tool: exchange matrix and materials to radiosity.
-//!
-//! Exit codes: 0 done; 1 failed; 2 bad usage; 3 written, but the asked tolerance was not reached.
+//! Command line of solve-tool.
 
 use clap::{Parser, Subcommand};
 use interchange::grouping::By;
-use interchange::tool::{Common, Finish, exit_code, print_data};
+use interchange::tool::{Common, EXIT_CODES, Finish, exit_code, positive, print_data};
 use solve_tool::run::SolveRequest;
 use solve_tool::solve::Solver;
 use std::path::PathBuf;
@@ -12,7 +10,7 @@ use std::process::ExitCode;
 
 /// Radiosity from an exchange matrix and materials.
 #[derive(Debug, Parser)]
-#[command(version, arg_required_else_help = true)]
+#[command(version, arg_required_else_help = true, after_help = EXIT_CODES)]
 struct Cli {
     #[command(flatten)]
     common: Common,
@@ -64,13 +62,6 @@ enum Command {
         #[arg(long)]
         json: bool,
     },
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(x) if x.is_finite() && x > 0.0 => Ok(x),
-        _ => Err("a finite number above 0 is needed".into()),
-    }
 }
 
 fn main() -> ExitCode {

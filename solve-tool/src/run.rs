@@ -6,6 +6,7 @@ use crate::error_budget::shortfall;
 use crate::lossless::Lossless;
 use crate::solve::{ChannelSolution, Solved, Solver, solve};
 use crate::system::System;
+use interchange::atomic_write::refuse_input;
 use interchange::materials_input::load_materials;
 use interchange::matrix::Matrix;
 use interchange::mesh::Mesh;
@@ -41,6 +42,8 @@ pub struct SolveRequest {
 
 /// Solves and writes the solution and its report. Nothing is written where there is no solution.
 pub fn run(request: &SolveRequest) -> Result<Finish> {
+    let given = [Some(&request.matrix), Some(&request.mesh), request.materials.as_ref()];
+    refuse_input(&request.output, given.into_iter().flatten().map(PathBuf::as_path))?;
     let mut report = Report::new(TOOL, VERSION);
     let (mesh, _, mesh_digest) = report.phase("read mesh", || Mesh::read(&request.mesh))?;
     let matrix = report.phase("map matrix", || Matrix::open(&request.matrix))?;

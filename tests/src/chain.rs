@@ -1,6 +1,7 @@
 //! The four programs one after another on one scene, without make: each stage as a command, and all of them in order.
 
 use crate::programs::{Run, run, tool};
+use crate::table::Table;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -52,6 +53,10 @@ pub struct Chain {
     scene: PathBuf,
     /// Flags of `mesh-tool build`.
     pub mesh_flags: Vec<String>,
+    /// Flags of `formfactor-tool compute`.
+    pub matrix_flags: Vec<String>,
+    /// Flags of `solve-tool solve`.
+    pub solve_flags: Vec<String>,
     /// Flags of every stage.
     pub common: Vec<String>,
 }
@@ -60,7 +65,21 @@ impl Chain {
     /// A scene, meshed into about `elements` elements, with its files in `folder` named `s.*`.
     pub fn new(scene: PathBuf, folder: &Path, elements: u32) -> Self {
         let mesh_flags = vec!["--elements".into(), elements.to_string()];
-        Self { folder: folder.to_owned(), scene, mesh_flags, common: Vec::new() }
+        Self { mesh_flags, ..Self::as_given(scene, folder) }
+    }
+
+    /// A scene whose faces are its elements, with its files in `folder` named `s.*`.
+    pub fn as_given(scene: PathBuf, folder: &Path) -> Self {
+        let matrix_flags = vec!["--tolerance".into(), "1e-3".into()];
+        let (mesh_flags, solve_flags, common) = (Vec::new(), Vec::new(), Vec::new());
+        Self { folder: folder.to_owned(), scene, mesh_flags, matrix_flags, solve_flags, common }
+    }
+
+    /// The same chain with these tolerances of matrix and solution.
+    pub fn with_tolerances(mut self, matrix: &str, solution: &str) -> Self {
+        self.matrix_flags = vec!["--tolerance".into(), matrix.into()];
+        self.solve_flags = vec!["--tolerance".into(), solution.into()];
+        self
     }
 
     /// The file with this ending.
@@ -85,8 +104,11 @@ impl Chain {
         match stage {
             Stage::Materials => command.arg("materials").arg(&self.scene),
             Stage::Build => command.arg("build").arg(&self.scene).args(&self.mesh_flags),
-            Stage::Compute => command.arg("compute").arg(self.path("mesh")).args(["--tolerance", "1e-3"]),
-            Stage::Solve => command.arg("solve").arg(self.path("ff")).arg("--mesh").arg(self.path("mesh")),
+            Stage::Compute => command.arg("compute").arg(self.path("mesh")).args(&self.matrix_flags),
+            Stage::Solve => {
+                command.arg("solve").arg(self.path("ff")).arg("--mesh").arg(self.path("mesh"));
+                command.args(&self.solve_flags)
+            }
             Stage::Render => {
                 command.arg("render").arg(self.path("sol")).arg("--mesh").arg(self.path("mesh"));
                 command.args(["--size", "40x30", "--png"]).arg(output.with_extension("png"))
@@ -103,6 +125,68 @@ impl Chain {
             let done = run(&mut self.command(stage));
             assert!(matches!(done.code, Some(0 | 3)), "{stage:?}: exit {:?}: {}", done.code, done.stderr);
         }
+    }
+}
+
+/// What the numbers' tests ask of the chain: each stage must end with 0, its tolerance met.
+impl Chain {
+    /// Mesh and matrix.
+    #[track_caller]
+    pub fn compute(&self) {
+        for stage in [Stage::Build, Stage::Compute] {
+            run(&mut self.command(stage)).expect_code(0);
+        }
+    }
+
+    /// Mesh, matrix and solution.
+    #[track_caller]
+    pub fn solve(&self) {
+        self.compute();
+        run(&mut self.command(Stage::Solve)).expect_code(0);
+    }
+
+    /// The matrix as a table, `by` face or group.
+    #[track_caller]
+    pub fn factors(&self, by: &str) -> Table {
+        self.export(tool("formfactor-tool"), "ff", by)
+    }
+
+    /// The solution as a table, `by` element, face or group.
+    #[track_caller]
+    pub fn radiosities(&self, by: &str) -> Table {
+        self.export(tool("solve-tool"), "sol", by)
+    }
+
+    #[track_caller]
+    fn export(&self, mut export: Command, ending: &str, by: &str) -> Table {
+        let output = self.folder.join(format!("{ending}_{by}.csv"));
+        export.arg("export").arg(self.path(ending)).arg("--mesh").arg(self.path("mesh")).args(["--by", by]);
+        run(export.arg("-o").arg(&output)).expect_code(0);
+        Table::read(&output)
+    }
+
+    /// Irradiance at points, each with a normal; the columns are those of `shade-tool probe`.
+    #[track_caller]
+    pub fn probe(&self, points: &[[f64; 6]]) -> Table {
+        let (asked, output) = (self.folder.join("points.csv"), self.folder.join("probed.csv"));
+        let line = |point: &[f64; 6]| point.map(|x| format!("{x:?}")).join(",");
+        let lines: Vec<String> = points.iter().map(line).collect();
+        let text = format!("x,y,z,nx,ny,nz\n{}\n", lines.join("\n"));
+        std::fs::write(&asked, text).unwrap_or_else(|e| panic!("{}: {e}", asked.display()));
+        let mut probe = tool("shade-tool");
+        probe.arg("probe").arg(self.path("sol")).arg("--mesh").arg(self.path("mesh"));
+        run(probe.arg("--points").arg(&asked).arg("-o").arg(&output)).expect_code(0);
+        let table = Table::read(&output);
+        assert_eq!(table.rows.len(), points.len());
+        table
+    }
+
+    /// A number of the report beside the file with this ending, such as `estimates` / `solver bound`.
+    #[track_caller]
+    pub fn reported(&self, ending: &str, part: &str, key: &str) -> f64 {
+        let path = self.path(&format!("{ending}.report.json"));
+        let report: serde_json::Value = serde_json::from_str(&crate::text(&path)).expect("a report in JSON");
+        report[part][key].as_f64().unwrap_or_else(|| panic!("{}: no {part} / {key}", path.display()))
     }
 }
 

@@ -7,6 +7,7 @@ pub mod close;
 pub mod damage;
 pub mod pipeline;
 pub mod programs;
+pub mod surfaces;
 pub mod table;
 pub mod two_squares;
 

@@ -134,3 +134,29 @@ fn what_is_usable_now_is_taken() {
         assert_eq!(done.stdout, "", "{line}");
     }
 }
+
+#[test]
+fn an_output_that_is_an_input_is_refused() {
+    for (line, output) in [
+        ("mesh-tool build a.obj -o a.obj", "a.obj"),
+        ("mesh-tool materials a.obj -o ./a.obj", "a.obj"),
+        ("formfactor-tool compute a.mesh -o ./a.mesh", "a.mesh"),
+        ("formfactor-tool export a.csv --mesh a.mesh --by group -o a.csv", "a.csv"),
+        ("solve-tool solve a.ff --mesh a.mesh -o a.ff", "a.ff"),
+        ("solve-tool solve a.ff --mesh a.mesh -o a.mesh", "a.mesh"),
+        ("solve-tool solve a.ff --mesh a.mesh --materials a.mtl -o a.mtl", "a.mtl"),
+        ("solve-tool export a.csv --mesh a.mesh --by group -o a.csv", "a.csv"),
+        ("shade-tool probe a.sol --mesh a.mesh --points a.csv -o a.csv", "a.csv"),
+    ] {
+        let folder = tests::folder();
+        let scene = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+        for name in ["a.obj", "a.mtl", "a.mesh", "a.ff", "a.sol", "a.csv"] {
+            std::fs::write(folder.path().join(name), scene).unwrap();
+        }
+        let mut words = line.split_whitespace();
+        let done = run(tool(words.next().unwrap()).args(words).current_dir(folder.path()));
+        assert_eq!(done.code, Some(1), "{line}: {}", done.stderr);
+        assert!(done.stderr.contains("is an input"), "{line}: {}", done.stderr);
+        assert_eq!(tests::text(&folder.path().join(output)), scene, "{line}");
+    }
+}

@@ -43,3 +43,21 @@ fn the_walk_through_the_files_works() {
     assert_eq!(probed.header[6..], ["H_r", "H_g", "H_b"]);
     assert!(probed.number(0, "H_r") > 0.0);
 }
+
+#[test]
+fn a_swapped_solver_is_called_as_written() {
+    let text = tests::text(&tests::root().join("README.md"));
+    let quoted = text.split('`').find(|part| part.starts_with("python3 my_solver.py solve ")).unwrap();
+    let folder = tests::folder();
+    std::fs::write(folder.path().join("my_solver.py"), "").unwrap();
+    let mut make = tests::pipeline::make_command(folder.path());
+    // The other programs need only be there: nothing runs.
+    for (variable, tool) in
+        [("MESH_TOOL", "mesh-tool"), ("FORMFACTOR_TOOL", "formfactor-tool"), ("SHADE_TOOL", "shade-tool")]
+    {
+        make.arg(format!("{variable}={}", program(tool).display()));
+    }
+    make.args(["-n", "SOLVE_TOOL=python3 my_solver.py"]);
+    let done = run(&mut make).expect_code(0);
+    assert!(done.stdout.contains(&format!("\n{quoted};")), "{quoted} is not in: {}", done.stdout);
+}
