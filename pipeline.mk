@@ -52,9 +52,10 @@ SHADE_TOOL      ?= $(BIN)shade-tool
 # The mesh decides the picture's error. The matrix tolerance bounds the worst row: over all rows the estimate is a fifth
 # to a tenth of it and the true error a tenth of that, so twice ERROR leaves the picture as it is (Cornell box, 3000
 # elements, ERROR=0.01: RMS 0.0067 at the reference points with 0.0005, 0.005 and 0.02 alike). The solver's bound is
-# on the same scale as ERROR, and its last product takes one more bounce off it. e is ERROR.
+# on the same scale as ERROR, and its last product takes one more bounce off it. A scene of many faces needs several
+# elements for each before any can go where the light is. e is ERROR, faces their number in the OBJ.
 define CALIBRATION
-elements = 30 / e;
+elements = 30 / e + 8 * faces;
 if (elements < 200) elements = 200;
 if (elements > 20000) elements = 20000;
 ff_tolerance = 2 * e; if (ff_tolerance > 0.5) ff_tolerance = 0.5;
@@ -64,7 +65,8 @@ endef
 
 quote := '
 quoted = $(quote)$(subst $(quote),$(quote)\$(quote)$(quote),$(strip $1))$(quote)
-derived := $(shell LC_ALL=C awk -v given=$(call quoted,$(ERROR)) 'BEGIN { e = given + 0; \
+faces   := $(or $(shell grep -c '^[[:space:]]*f[[:space:]]' $(call quoted,$(SCENE)) 2> /dev/null),0)
+derived := $(shell LC_ALL=C awk -v given=$(call quoted,$(ERROR)) -v faces=$(faces) 'BEGIN { e = given + 0; \
   if (given !~ /^[0-9]*[.]?[0-9]+([eE][-+]?[0-9]+)?$$/ || e <= 0 || e > 1) exit; \
   $(CALIBRATION) printf "%d %.6g %.6g %.6g", elements + 0.5, ff_tolerance, solve_tolerance, shade_tolerance }')
 ifneq ($(words $(derived)),4)

@@ -33,7 +33,8 @@ fn penumbra_has_the_smallest_elements() {
         })
     };
     let (penumbra, outside) = (ring(0.3, 1.3), ring(2.0, 3.0));
-    assert!(penumbra < 0.6 * outside, "{penumbra} against {outside}");
+    // Far out the light falls with the fourth power of the cosine, which takes elements too.
+    assert!(penumbra < 0.85 * outside, "{penumbra} against {outside}");
     assert!(report.counters["rounds of refinement for light"] > 0);
     let (before, after) = (
         report.estimates["deviation of light within elements before"],
