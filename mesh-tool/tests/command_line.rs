@@ -162,7 +162,7 @@ fn scene_is_never_overwritten() {
         let output =
             tool(&folder).args([command, "goral_cube.obj", "-o", "goral_cube.obj"]).output().unwrap();
         assert_eq!(output.status.code(), Some(1));
-        assert!(text_of(&output).contains("input of the scene"));
+        assert!(text_of(&output).contains("is an input"));
     }
     assert_eq!(std::fs::read(folder.join("goral_cube.obj")).unwrap(), before);
 }
