@@ -55,7 +55,7 @@ SHADE_TOOL      ?= $(BIN)shade-tool
 # on the same scale as ERROR, and its last product takes one more bounce off it. A scene of many faces needs several
 # elements for each before any can go where the light is. e is ERROR, faces their number in the OBJ.
 define CALIBRATION
-elements = 30 / e + 8 * faces;
+elements = 30 / e + 11 * faces;
 if (elements < 200) elements = 200;
 if (elements > 20000) elements = 20000;
 ff_tolerance = 2 * e; if (ff_tolerance > 0.5) ff_tolerance = 0.5;
