@@ -26,7 +26,7 @@ pub fn kernel_sum(p: &RulePoints, normal_p: DVec3, q: &RulePoints, normal_q: DVe
     sum / PI
 }
 
-/// Constants c of the error estimate c K theta^(degree + 1), from the worst of 4 10^5 random pairs of triangles and
+/// Constants c of the error estimate c K theta^(degree + 1), from the worst of 4 10^4 random pairs of triangles and
 /// quadrilaterals (test `estimate_covers_the_error`), rounded up. K is the kernel with its largest cosines.
 fn constant(strength: Strength) -> f64 {
     match strength {

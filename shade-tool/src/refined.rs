@@ -305,8 +305,8 @@ mod tests {
         let (refined, places) = refined(&scene, 0.01);
         assert!(refined.cut > 20 && refined.gathered > 100, "{refined:?}");
         let weights = &mut Vec::new();
-        // The middle of the floor sees the lamp, a square of side 0.1 at height 0.1, under 0.2395 by 2.8's formula for a
-        // point below the centre: 4 (1 / 2 pi) 2 (s / sqrt(1 + s^2)) atan(s / sqrt(1 + s^2)), s = 1/2.
+        // The middle of the floor sees the lamp, a square of side 0.1 at height 0.1, by four right-angled corners: each
+        // gives (1 / pi) l atan(l) with l = s / sqrt(1 + s^2), s = 1/2.
         let leg = 0.5 / 1.25f64.sqrt();
         let want = 4.0 / std::f64::consts::PI * leg * leg.atan();
         let middle = 0.5 * (places[0][0] + places[0][2]);
