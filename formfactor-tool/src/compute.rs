@@ -39,7 +39,7 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     let scene = report.phase("prepare", || Scene::new(&mesh, &skips))?;
     let (pairs, settled) = report.phase("traverse", || leaf_pairs(&scene, &skips));
 
-    let estimator = Exact::new(&scene, tolerance);
+    let estimator = report.phase("look", || Exact::new(&scene, &skips, &pairs, tolerance));
     let bar = common.progress("form factors", pairs.len());
     let tiles: Vec<Tile> = report.phase("pairs", || {
         let compute = |pair| {

@@ -1,6 +1,6 @@
 //! How many pairs each class had and what they cost: for the report.
 
-use geometry::pair::Class;
+use geometry::occluded::Effort;
 use geometry::unoccluded::Rule;
 use interchange::report::Report;
 
@@ -24,25 +24,23 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Adds a pair of this class.
-    pub fn add_class(&mut self, class: Class) {
-        match class {
-            Class::Invisible => self.behind += 1,
-            Class::FullyBlocked => self.covered += 1,
-            Class::Unoccluded(rule) => match rule {
-                Rule::Invisible => self.behind += 1,
-                Rule::Centre => self.unoccluded[0] += 1,
-                Rule::Low => self.unoccluded[1] += 1,
-                Rule::Middle => self.unoccluded[2] += 1,
-                Rule::Product => self.unoccluded[3] += 1,
-                Rule::Contour => self.unoccluded[4] += 1,
-            },
-            Class::Occluded(effort) => {
-                self.occluded += 1;
-                self.visible_parts += effort.evaluations;
-                self.exhausted += usize::from(effort.exhausted);
-            }
+    /// Adds an unoccluded pair served by this rule.
+    pub fn add_unoccluded(&mut self, rule: Rule) {
+        match rule {
+            Rule::Invisible => self.behind += 1,
+            Rule::Centre => self.unoccluded[0] += 1,
+            Rule::Low => self.unoccluded[1] += 1,
+            Rule::Middle => self.unoccluded[2] += 1,
+            Rule::Product => self.unoccluded[3] += 1,
+            Rule::Contour => self.unoccluded[4] += 1,
         }
+    }
+
+    /// Adds a partly occluded pair.
+    pub fn add_occluded(&mut self, effort: Effort) {
+        self.occluded += 1;
+        self.visible_parts += effort.evaluations;
+        self.exhausted += usize::from(effort.exhausted);
     }
 
     /// Adds what another part counted.

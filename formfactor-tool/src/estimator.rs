@@ -17,6 +17,7 @@ pub trait Estimator: Sync {
 #[derive(Debug)]
 pub struct TileBuilder {
     diagonal: bool,
+    columns: usize,
     tile: Tile,
 }
 
@@ -31,12 +32,33 @@ impl TileBuilder {
             column_errors: vec![0.0; columns],
             counts: Counts::default(),
         };
-        Self { diagonal, tile }
+        Self { diagonal, columns: pair.columns.len(), tile }
+    }
+
+    /// A tile that is zero wherever [`TileBuilder::set`] does not say otherwise.
+    pub fn zeros(pair: &LeafPair) -> Self {
+        let mut builder = Self::new(pair);
+        builder.tile.values.resize(pair.pairs(), 0.0);
+        builder
     }
 
     /// Appends entry (row, column), counted from the tile's first: row after row.
     pub fn push(&mut self, row: usize, column: usize, value: f64, error: f64) {
         self.tile.values.push(value);
+        self.tile.row_errors[row] += error;
+        if !self.diagonal {
+            self.tile.column_errors[column] += error;
+        } else if row != column {
+            self.tile.row_errors[column] += error;
+        }
+    }
+
+    /// Sets entry (row, column) of a tile made by [`TileBuilder::zeros`], counted from the tile's first; once per entry.
+    pub fn set(&mut self, row: usize, column: usize, value: f64, error: f64) {
+        let n = self.tile.row_errors.len();
+        let before =
+            if self.diagonal { row * n - row * row.saturating_sub(1) / 2 - row } else { row * self.columns };
+        self.tile.values[before + column] = value;
         self.tile.row_errors[row] += error;
         if !self.diagonal {
             self.tile.column_errors[column] += error;

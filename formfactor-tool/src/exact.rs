@@ -1,21 +1,28 @@
 //! `--method auto`: every pair by the cheapest rule that keeps the tolerance, exact visible parts where something blocks.
+//!
+//! A row's tolerance is shared out in two halves: one to the pairs that see each other wholly, in proportion to their
+//! factors, one to the partly occluded pairs, in proportion to their factors without blockers. How much those add up to
+//! in each row is found first, by looking at all pairs without computing any.
 
+use crate::counts::Counts;
+use crate::descent::{Findings, descend};
 use crate::estimator::{Estimator, TileBuilder};
 use crate::scene::Scene;
+use crate::skips::Skips;
 use crate::tile::Tile;
 use crate::traversal::LeafPair;
-use geometry::contour::Exchange;
-use geometry::occluder::Occluder;
-use geometry::pair::{self, Accuracy};
-use geometry::visible::Scratch;
+use geometry::occluded::Wanted;
+use geometry::pair::{InFront, Scratch};
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// Share of a row's error given to unoccluded pairs: their factors add up to at most 1.
 const UNOCCLUDED_SHARE: f64 = 0.5;
 /// Unoccluded pairs are never asked less: they cost little, and in bright closed rooms what their rows miss of 1 counts
 /// 1 / (1 - rho) times.
 const UNOCCLUDED_LOOSEST: f64 = 2e-3;
-/// Share given to occluded pairs, relative to their factors without blockers, which add up to about 2 at most in rooms.
-const OCCLUDED_SHARE: f64 = 0.25;
+/// Share of a row's error given to partly occluded pairs.
+const OCCLUDED_SHARE: f64 = 0.5;
 /// Most visible parts for one pair: a pair of whole walls behind a box needs some 10^5 for 12 digits.
 const MOST_EVALUATIONS: usize = 400_000;
 
@@ -23,35 +30,30 @@ const MOST_EVALUATIONS: usize = 400_000;
 #[derive(Debug)]
 pub struct Exact<'a> {
     scene: &'a Scene,
-    accuracy: Accuracy,
+    skips: &'a Skips,
+    /// Relative error of an unoccluded factor.
+    unoccluded: f64,
+    /// Per row: error of a partly occluded factor, relative to the factor without blockers.
+    occluded: Vec<f64>,
 }
 
 impl<'a> Exact<'a> {
     /// For rows within `tolerance`.
-    pub fn new(scene: &'a Scene, tolerance: f64) -> Self {
-        let accuracy = Accuracy {
-            unoccluded: (UNOCCLUDED_SHARE * tolerance).min(UNOCCLUDED_LOOSEST),
-            occluded: OCCLUDED_SHARE * tolerance,
-            // Over a row these shares add up to one more factor of 1.
-            least_factor: 1.0 / scene.len() as f64,
-            most_evaluations: MOST_EVALUATIONS,
-        };
-        Self { scene, accuracy }
+    pub fn new(scene: &'a Scene, skips: &'a Skips, pairs: &[LeafPair], tolerance: f64) -> Self {
+        let sizes = occluded_sizes(scene, skips, pairs);
+        let occluded = sizes.iter().map(|&size| OCCLUDED_SHARE * tolerance / size.max(tolerance)).collect();
+        let unoccluded = (UNOCCLUDED_SHARE * tolerance).min(UNOCCLUDED_LOOSEST);
+        Self { scene, skips, unoccluded, occluded }
     }
 }
 
 impl Estimator for Exact<'_> {
     fn tile(&self, pair: &LeafPair) -> Tile {
-        let mut builder = TileBuilder::new(pair);
-        let (mut blockers, mut scratch) = (Vec::new(), Scratch::default());
-        for i in pair.rows.clone() {
-            let first = if pair.is_diagonal() { i } else { pair.columns.start };
-            for j in first..pair.columns.end {
-                let found = self.entry(i, j, pair, &mut builder, &mut blockers, &mut scratch);
-                builder.push(i - pair.rows.start, j - pair.columns.start, found.value, found.error);
-            }
-        }
-        builder.finish()
+        let mut filling = Filling { exact: self, pair, builder: TileBuilder::zeros(pair) };
+        let mut counts = Counts::default();
+        descend(self.scene, self.skips, pair, &mut filling, &mut counts, &mut Scratch::default());
+        *filling.builder.counts() = counts;
+        filling.builder.finish()
     }
 
     fn work(&self, pair: &LeafPair) -> f64 {
@@ -59,30 +61,88 @@ impl Estimator for Exact<'_> {
     }
 }
 
-impl<'a> Exact<'a> {
-    fn entry(
-        &self,
-        i: usize,
-        j: usize,
-        pair: &LeafPair,
-        builder: &mut TileBuilder,
-        blockers: &mut Vec<&'a Occluder>,
-        scratch: &mut Scratch,
-    ) -> Exchange {
-        let scene = self.scene;
-        if scene.faces[i] == scene.faces[j] {
-            builder.counts().same_plane += 1;
-            return Exchange::NONE;
+/// Computes what the descent finds.
+struct Filling<'e> {
+    exact: &'e Exact<'e>,
+    pair: &'e LeafPair,
+    builder: TileBuilder,
+}
+
+impl Findings for Filling<'_> {
+    fn clear(&mut self, rows: Range<usize>, columns: Range<usize>, counts: &mut Counts) {
+        let patches = &self.exact.scene.patches;
+        for i in rows {
+            for j in columns.clone() {
+                let Some(pair) = InFront::new(&patches[i], &patches[j]) else {
+                    counts.behind += 1;
+                    continue;
+                };
+                let (found, rule) = pair.unoccluded(self.exact.unoccluded);
+                counts.add_unoccluded(rule);
+                let (row, column) = (i - self.pair.rows.start, j - self.pair.columns.start);
+                self.builder.set(row, column, found.value, found.error);
+            }
         }
-        let between = pair
-            .blockers
-            .iter()
-            .map(|&k| k as usize)
-            .filter(|&k| scene.sides[i].may_block(&scene.sides[j], k))
-            .map(|k| &scene.occluders[k]);
-        let (found, class) =
-            pair::exchange(&scene.patches[i], &scene.patches[j], between, self.accuracy, blockers, scratch);
-        builder.counts().add_class(class);
-        found
     }
+
+    fn partial(
+        &mut self,
+        (i, j): (usize, usize),
+        pair: &InFront<'_>,
+        which: Range<usize>,
+        counts: &mut Counts,
+        scratch: &mut Scratch<'_>,
+    ) {
+        let unblocked = pair.unblocked_size();
+        let tolerance = self.exact.occluded[i].min(self.exact.occluded[j]) * unblocked;
+        let wanted = Wanted { tolerance, unblocked, most_evaluations: MOST_EVALUATIONS };
+        let (found, effort) = pair.occluded(which, wanted, scratch);
+        counts.add_occluded(effort);
+        let (row, column) = (i - self.pair.rows.start, j - self.pair.columns.start);
+        self.builder.set(row, column, found.value, found.error);
+    }
+}
+
+/// Adds up what stands behind blockers in part.
+struct Sizes<'e> {
+    pair: &'e LeafPair,
+    of_rows: Vec<f64>,
+    of_columns: Vec<f64>,
+}
+
+impl Findings for Sizes<'_> {
+    fn clear(&mut self, _: Range<usize>, _: Range<usize>, _: &mut Counts) {}
+
+    fn partial(
+        &mut self,
+        (i, j): (usize, usize),
+        pair: &InFront<'_>,
+        _: Range<usize>,
+        _: &mut Counts,
+        _: &mut Scratch<'_>,
+    ) {
+        let size = pair.unblocked_size();
+        self.of_rows[i - self.pair.rows.start] += size;
+        self.of_columns[j - self.pair.columns.start] += size;
+    }
+}
+
+/// Per row the sum over its partly occluded pairs of the factors without blockers.
+fn occluded_sizes(scene: &Scene, skips: &Skips, pairs: &[LeafPair]) -> Vec<f64> {
+    let blocked: Vec<&LeafPair> = pairs.iter().filter(|pair| !pair.blockers.is_empty()).collect();
+    let parts: Vec<Sizes<'_>> = blocked
+        .par_iter()
+        .map_init(Scratch::default, |scratch, pair| {
+            let (of_rows, of_columns) = (vec![0.0; pair.rows.len()], vec![0.0; pair.columns.len()]);
+            let mut sizes = Sizes { pair, of_rows, of_columns };
+            descend(scene, skips, pair, &mut sizes, &mut Counts::default(), scratch);
+            sizes
+        })
+        .collect();
+    let mut sums = vec![0.0; scene.len()];
+    for part in &parts {
+        part.pair.rows.clone().zip(&part.of_rows).for_each(|(i, size)| sums[i] += size);
+        part.pair.columns.clone().zip(&part.of_columns).for_each(|(j, size)| sums[j] += size);
+    }
+    sums.iter().zip(&scene.patches).map(|(sum, patch)| sum / patch.area).collect()
 }

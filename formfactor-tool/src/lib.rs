@@ -7,6 +7,7 @@
 
 pub mod compute;
 pub mod counts;
+pub mod descent;
 pub mod estimator;
 pub mod exact;
 pub mod export;

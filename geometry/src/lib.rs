@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod area_rule;
+pub mod body;
 pub mod contour;
 pub mod edge_pair;
 pub mod gather;
@@ -19,7 +20,9 @@ pub mod point_factor;
 pub mod polygon;
 pub mod quadrature;
 pub mod ray_cast;
+pub mod shadow;
 pub mod shadow_planes;
 pub mod sides;
 pub mod unoccluded;
 pub mod visible;
+pub mod visible_part;
