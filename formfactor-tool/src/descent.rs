@@ -16,6 +16,11 @@ pub trait Findings {
     /// Nothing stands between any of the rows and any of the columns; they need not see each other's front.
     fn clear(&mut self, rows: Range<usize>, columns: Range<usize>, counts: &mut Counts);
 
+    /// Something stands between two clusters. `true` where nothing more needs to be known of them.
+    fn undecided(&mut self, _: &Cluster, _: &Cluster) -> bool {
+        false
+    }
+
     /// Elements i and j see each other past the shadows `which`.
     fn partial(
         &mut self,
@@ -78,6 +83,8 @@ impl<'a, F: Findings> Descent<'a, '_, F> {
             let now = start..scratch.shadows.len();
             if now.is_empty() && still_pending.is_empty() {
                 self.findings.clear(first.range.clone(), second.range.clone(), self.counts);
+            } else if self.findings.undecided(first, second) {
+                // Looked at closely enough.
             } else if let Some(children) = children(first, second, a, b) {
                 for (c, d) in children {
                     self.visit(c, d, now.clone(), &still_pending, scratch);

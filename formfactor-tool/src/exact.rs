@@ -7,22 +7,24 @@
 use crate::counts::Counts;
 use crate::descent::{Findings, descend};
 use crate::estimator::{Estimator, TileBuilder};
-use crate::scene::Scene;
+use crate::scene::{Cluster, Scene};
 use crate::skips::Skips;
 use crate::tile::Tile;
 use crate::traversal::LeafPair;
 use geometry::occluded::Wanted;
 use geometry::pair::{InFront, Scratch};
+use glam::DVec3;
 use rayon::prelude::*;
+use std::f64::consts::PI;
 use std::ops::Range;
 
 /// Share of a row's error given to unoccluded pairs: their factors add up to at most 1.
-const UNOCCLUDED_SHARE: f64 = 0.5;
+const UNOCCLUDED_SHARE: f64 = 0.3;
 /// Unoccluded pairs are never asked less: they cost little, and in bright closed rooms what their rows miss of 1 counts
 /// 1 / (1 - rho) times.
 const UNOCCLUDED_LOOSEST: f64 = 2e-3;
 /// Share of a row's error given to partly occluded pairs.
-const OCCLUDED_SHARE: f64 = 0.5;
+const OCCLUDED_SHARE: f64 = 1.5;
 /// Most visible parts for one pair: a pair of whole walls behind a box needs some 10^5 for 12 digits.
 const MOST_EVALUATIONS: usize = 400_000;
 
@@ -103,8 +105,13 @@ impl Findings for Filling<'_> {
     }
 }
 
+/// Sets of elements of at most this many pairs are taken for partly occluded together when tolerances are shared out:
+/// some of their pairs are not, so the others get a little less than they could.
+const LOOKED_AT_TOGETHER: usize = 16;
+
 /// Adds up what stands behind blockers in part.
 struct Sizes<'e> {
+    scene: &'e Scene,
     pair: &'e LeafPair,
     of_rows: Vec<f64>,
     of_columns: Vec<f64>,
@@ -112,6 +119,33 @@ struct Sizes<'e> {
 
 impl Findings for Sizes<'_> {
     fn clear(&mut self, _: Range<usize>, _: Range<usize>, _: &mut Counts) {}
+
+    fn undecided(&mut self, first: &Cluster, second: &Cluster) -> bool {
+        let (Some(p), Some(q)) = (first.plane, second.plane) else { return false };
+        if first.len() * second.len() > LOOKED_AT_TOGETHER {
+            return false;
+        }
+        let middle = |c: &Cluster| c.hull.iter().sum::<DVec3>() / c.hull.len() as f64;
+        let between = middle(second) - middle(first);
+        let distance = between.length();
+        // Beside each other the middles say little: single pairs are looked at.
+        if distance < first.radius + second.radius {
+            return false;
+        }
+        let tilt = (first.radius + second.radius) / distance;
+        let cosine = |height: f64| (height / distance).clamp(0.25 * tilt, 1.0);
+        let kernel =
+            cosine(p.normal.dot(between)) * cosine(-q.normal.dot(between)) / (PI * distance * distance);
+        let area = |c: &Cluster| self.scene.patches[c.range.clone()].iter().map(|p| p.area).sum::<f64>();
+        let (area_p, area_q) = (area(first), area(second));
+        for i in first.range.clone() {
+            self.of_rows[i - self.pair.rows.start] += self.scene.patches[i].area * area_q * kernel;
+        }
+        for j in second.range.clone() {
+            self.of_columns[j - self.pair.columns.start] += self.scene.patches[j].area * area_p * kernel;
+        }
+        true
+    }
 
     fn partial(
         &mut self,
@@ -134,7 +168,7 @@ fn occluded_sizes(scene: &Scene, skips: &Skips, pairs: &[LeafPair]) -> Vec<f64> 
         .par_iter()
         .map_init(Scratch::default, |scratch, pair| {
             let (of_rows, of_columns) = (vec![0.0; pair.rows.len()], vec![0.0; pair.columns.len()]);
-            let mut sizes = Sizes { pair, of_rows, of_columns };
+            let mut sizes = Sizes { scene, pair, of_rows, of_columns };
             descend(scene, skips, pair, &mut sizes, &mut Counts::default(), scratch);
             sizes
         })

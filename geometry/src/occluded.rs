@@ -8,6 +8,7 @@ use crate::shadow::{Blocking, From, Set, Shadows};
 use crate::shadow_planes::{ShadowPlane, WORTHLESS_CUT, shadow_planes};
 use crate::visible_part::{self, visible_factor};
 use glam::DVec3;
+use std::collections::BinaryHeap;
 use std::ops::Range;
 
 /// Points a side of the rules of rising order.
@@ -17,15 +18,18 @@ const ORDERS: [usize; 3] = [2, 4, 8];
 const ORDER_ERROR: f64 = 0.1;
 /// Over a smooth cell the 2 x 2 rule errs like the square of its distance from the centre's value, relative to the value:
 /// that distance is the second order term, the error the fourth. The factor covers the worst of 10^5 cells.
-const SMOOTH_ERROR: f64 = 1.0;
+const SMOOTH_ERROR: f64 = 4.0;
 /// Where shadow lines cross a cell, its points may all miss what lies between them: that much of the unblocked
 /// factor is never ruled out.
 const UNSEEN: f64 = 0.02;
 /// Corners are looked at from this part of the way to the centre inside.
 const CORNER_INSET: f64 = 1e-3;
-/// Share of the distance between the 2 x 2 rule and the mean over the corners that counts as error: over a smooth cell
-/// that distance is about twice the one from the centre's value.
-const CORNER_ERROR: f64 = 0.5;
+/// Share of the distance between the 2 x 2 rule and the mean over the corners that counts as error where the corners see
+/// something that the points do not: the part of the cell that it may fill.
+const CORNER_ERROR: f64 = 0.1;
+/// Share of the distance between the 2 x 2 rule and the centre's value that counts as error where edges of different
+/// bodies may cross: the view's second derivative may jump there, of which the rule misses a part.
+const KINK: f64 = 0.03;
 /// A cell whose corners are this many times farther off than its centre has a bend inside: higher orders do not help there.
 const BENT: f64 = 8.0;
 /// Up to this many shadow planes the receiver is cut along all of them at once; where there are more, along those that
@@ -66,6 +70,25 @@ struct Cell {
     /// Whether its corners see something that its points do not.
     bent: bool,
     area: f64,
+    /// Order of creation: makes the queue's order unique.
+    serial: usize,
+}
+
+impl PartialEq for Cell {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+impl Eq for Cell {}
+impl PartialOrd for Cell {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+impl Ord for Cell {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.error.total_cmp(&other.error).then(other.serial.cmp(&self.serial))
+    }
 }
 
 /// Working memory of [`exchange`].
@@ -73,7 +96,8 @@ struct Cell {
 pub struct Scratch {
     visible: visible_part::Scratch,
     corners: Vec<DVec3>,
-    cells: Vec<Cell>,
+    cells: BinaryHeap<Cell>,
+    values: Vec<(f64, f64)>,
     planes: Vec<ShadowPlane>,
     front: Vec<DVec3>,
     back: Vec<DVec3>,
@@ -89,6 +113,9 @@ struct Integral<'s, 'a> {
     scratch: &'s mut Scratch,
     wanted: Wanted,
     evaluations: usize,
+    /// Sum of the cells' errors, and number of cells made.
+    error: f64,
+    made: usize,
 }
 
 /// Exchange factor of `receiver` and the polygon `source`, each wholly in front of the other, behind the shadows `which`;
@@ -104,14 +131,26 @@ pub fn exchange(
     let corners = receiver.corners;
     let normal = receiver.normal.unwrap_or_else(|| polygon::vector_area(corners).normalize_or_zero());
     let base = shadows.len();
+    let base_count = which.len();
     scratch.corners.clear();
     scratch.corners.extend_from_slice(corners);
     scratch.cells.clear();
     let mut planes = std::mem::take(&mut scratch.planes);
     shadow_planes(corners, source.corners, shadows, which.clone(), from, &mut planes);
     let receiver_area = polygon::area(corners);
-    let mut integral =
-        Integral { receiver_area, receiver, normal, source, shadows, from, scratch, wanted, evaluations: 0 };
+    let mut integral = Integral {
+        receiver_area,
+        receiver,
+        normal,
+        source,
+        shadows,
+        from,
+        scratch,
+        wanted,
+        evaluations: 0,
+        error: 0.0,
+        made: 0,
+    };
     let whole = Cell {
         corners: 0..corners.len(),
         shadows: which,
@@ -121,13 +160,28 @@ pub fn exchange(
     };
     integral.run(whole, &planes);
     let evaluations = integral.evaluations;
+    {
+        use std::sync::atomic::Ordering::Relaxed;
+        let k = base_count.min(3);
+        STAT[k][0].fetch_add(1, Relaxed);
+        STAT[k][1].fetch_add(evaluations as u64, Relaxed);
+        STAT[k][2].fetch_add(planes.len() as u64, Relaxed);
+        STAT[k][3].fetch_add(integral.scratch.cells.len() as u64, Relaxed);
+        STAT[k][4].fetch_add(integral.scratch.cells.iter().filter(|c| c.order > 0).count() as u64, Relaxed);
+        STAT[k][5].fetch_add(
+            integral.scratch.cells.iter().filter(|c| c.shadows.is_empty()).count() as u64,
+            Relaxed,
+        );
+    }
     shadows.truncate(base);
     scratch.planes = planes;
 
     // Smallest first: the sum does not depend on the order in which cells were made, and loses no digits.
-    scratch.cells.sort_by(|a, b| a.value.total_cmp(&b.value));
-    let value: f64 = scratch.cells.iter().map(|c| c.value).sum();
-    let error: f64 = scratch.cells.iter().map(|c| c.error).sum();
+    let values = &mut scratch.values;
+    values.clear();
+    values.extend(scratch.cells.iter().map(|c| (c.value, c.error)));
+    values.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let (value, error) = values.iter().fold((0.0, 0.0), |(v, e), &(value, error)| (v + value, e + error));
     (Exchange { value, error }, Effort { evaluations, exhausted: error > wanted.tolerance })
 }
 
@@ -140,14 +194,15 @@ impl Integral<'_, '_> {
             self.add(whole);
         }
         loop {
-            let error: f64 = self.scratch.cells.iter().map(|c| c.error).sum();
-            if error <= self.wanted.tolerance || self.evaluations >= self.wanted.most_evaluations {
+            if self.error <= self.wanted.tolerance {
+                // The running sum has rounding in it: only a fresh one counts.
+                self.error = self.scratch.cells.iter().map(|c| c.error).sum();
+            }
+            if self.error <= self.wanted.tolerance || self.evaluations >= self.wanted.most_evaluations {
                 return;
             }
-            let worst = (0..self.scratch.cells.len()).fold(0, |best, k| {
-                if self.scratch.cells[k].error > self.scratch.cells[best].error { k } else { best }
-            });
-            let cell = self.scratch.cells.swap_remove(worst);
+            let Some(cell) = self.scratch.cells.pop() else { return };
+            self.error -= cell.error;
             self.improve(cell, planes);
         }
     }
@@ -196,6 +251,13 @@ impl Integral<'_, '_> {
         let value = self.integrate(&cell, ORDERS[cell.order]);
         cell.error = ORDER_ERROR * (value - cell.value).abs();
         cell.value = value;
+        self.keep(cell);
+    }
+
+    fn keep(&mut self, mut cell: Cell) {
+        cell.serial = self.made;
+        self.made += 1;
+        self.error += cell.error;
         self.scratch.cells.push(cell);
     }
 
@@ -217,7 +279,7 @@ impl Integral<'_, '_> {
                     From::First => (part, self.source),
                     From::Second => (self.source, part),
                 };
-                self.shadows.narrow(at, first, second) == Blocking::Everything
+                self.shadows.narrow(at, first, second, Some(self.from)) == Blocking::Everything
             });
             if dark {
                 self.shadows.truncate(start);
@@ -254,9 +316,9 @@ impl Integral<'_, '_> {
             let outer: f64 = cell.corners.clone().map(|k| self.near_corner(k, centre, &cell)).sum();
             let tip = (value - cell.area * outer / corners).abs();
             cell.bent = tip > BENT * distance;
-            distance.max(CORNER_ERROR * tip)
+            (KINK * distance).max(if cell.bent { CORNER_ERROR * tip } else { 0.0 })
         };
-        self.scratch.cells.push(cell);
+        self.keep(cell);
     }
 
     /// What is seen just inside corner `k` of a cell: on a contact line the corner itself has no view of its own.
@@ -319,3 +381,6 @@ impl Integral<'_, '_> {
         value
     }
 }
+
+pub static STAT: [[std::sync::atomic::AtomicU64; 6]; 4] =
+    [const { [const { std::sync::atomic::AtomicU64::new(0) }; 6] }; 4];

@@ -105,7 +105,7 @@ pub fn set(patch: &Patch) -> Set<'_> {
 pub fn narrow_all(which: Range<usize>, first: Set<'_>, second: Set<'_>, shadows: &mut Shadows<'_>) -> View {
     let start = shadows.len();
     for at in which {
-        if shadows.narrow(at, first, second) == Blocking::Everything {
+        if shadows.narrow(at, first, second, None) == Blocking::Everything {
             shadows.truncate(start);
             return View::Covered;
         }

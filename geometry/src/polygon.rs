@@ -98,41 +98,25 @@ pub fn clip_by(corners: &[DVec3], height: impl Fn(DVec3) -> f64, out: &mut Vec<D
     }
 }
 
-/// Cuts a convex polygon in two, for any function that is affine along the edges: `front` becomes the part where it is
-/// positive (empty where it nowhere is), the other part is appended to `back` (nothing where it is nowhere negative).
-pub fn clip_both(
-    corners: &[DVec3],
-    height: impl Fn(DVec3) -> f64,
-    front: &mut Vec<DVec3>,
-    back: &mut Vec<DVec3>,
-) {
+/// Cuts a convex polygon in two, by the heights of its corners over some line, of which some are above 0 and some below:
+/// `front` becomes the part above, the part below is appended to `back`.
+pub fn cut_in_two(corners: &[DVec3], heights: &[f64], front: &mut Vec<DVec3>, back: &mut Vec<DVec3>) {
     front.clear();
-    let start = back.len();
-    let Some(&last) = corners.last() else { return };
-    let (mut a, mut height_a) = (last, height(last));
-    let (mut any_front, mut any_back) = (false, false);
-    for &b in corners {
-        let height_b = height(b);
+    let (Some(&a), Some(&height)) = (corners.last(), heights.last()) else { return };
+    let (mut a, mut height_a) = (a, height);
+    for (&b, &height_b) in corners.iter().zip(heights) {
         if (height_a > 0.0 && height_b < 0.0) || (height_a < 0.0 && height_b > 0.0) {
             let crossing = a + (b - a) * (height_a / (height_a - height_b));
             front.push(crossing);
             back.push(crossing);
         }
         if height_b >= 0.0 {
-            any_front |= height_b > 0.0;
             front.push(b);
         }
         if height_b <= 0.0 {
-            any_back |= height_b < 0.0;
             back.push(b);
         }
         (a, height_a) = (b, height_b);
-    }
-    if !any_front || front.len() < 3 {
-        front.clear();
-    }
-    if !any_back || back.len() < start + 3 {
-        back.truncate(start);
     }
 }
 

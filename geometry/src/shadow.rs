@@ -6,6 +6,7 @@
 
 use crate::body::{Body, BodyEdge};
 use crate::plane::{PLANARITY, Plane};
+use crate::polygon;
 use glam::DVec3;
 use std::ops::Range;
 
@@ -24,7 +25,8 @@ fn stand(set: Set<'_>, face: &Plane, body: &Body) -> Standing {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for &point in set.corners {
         let height = face.distance(point);
-        (low, high) = (low.min(height), high.max(height));
+        low = if height < low { height } else { low };
+        high = if height > high { height } else { high };
     }
     match (low >= -tolerance, high <= tolerance) {
         (true, true) if body.is_flat() => 1,
@@ -156,15 +158,16 @@ impl<'a> Shadows<'a> {
         let faces = body.faces.len();
         let standings =
             [mark.standings..mark.standings + faces, mark.standings + faces..mark.standings + 2 * faces];
-        let blocking = self.finish(body, standings, mark, [first.corners, second.corners], None);
+        let blocking = self.finish(body, standings, mark, [first, second], None, None);
         if blocking != Blocking::Part {
             self.forget(mark);
         }
         blocking
     }
 
-    /// Looks again how the body of shadow `at` stands between parts of the two sets; as [`Shadows::add`], with less work.
-    pub fn narrow(&mut self, at: usize, first: Set<'_>, second: Set<'_>) -> Blocking {
+    /// Looks again how the body of shadow `at` stands between parts of the two sets; as [`Shadows::add`], with less work,
+    /// and less again where only one way round is wanted.
+    pub fn narrow(&mut self, at: usize, first: Set<'_>, second: Set<'_>, only: Option<From>) -> Blocking {
         let parent = self.list[at].clone();
         let mark = self.mark();
         let faces = parent.body.faces.len();
@@ -177,8 +180,7 @@ impl<'a> Shadows<'a> {
         }
         let standings =
             [mark.standings..mark.standings + faces, mark.standings + faces..mark.standings + 2 * faces];
-        let sets = [first.corners, second.corners];
-        let blocking = self.finish(parent.body, standings, mark, sets, Some(&parent));
+        let blocking = self.finish(parent.body, standings, mark, [first, second], Some(&parent), only);
         if blocking != Blocking::Part {
             self.forget(mark);
         }
@@ -190,8 +192,9 @@ impl<'a> Shadows<'a> {
         body: &'a Body,
         standings: [Range<usize>; 2],
         mark: Mark,
-        sets: [&[DVec3]; 2],
+        sets: [Set<'_>; 2],
         parent: Option<&Shadow<'a>>,
+        only: Option<From>,
     ) -> Blocking {
         let [of_first, of_second] = [0, 1].map(|k| standings[k].clone());
         let mut common = of_first.clone().zip(of_second.clone());
@@ -202,10 +205,17 @@ impl<'a> Shadows<'a> {
         if !body.is_flat() && !(is_outside(of_first) && is_outside(of_second)) {
             return Blocking::Inside;
         }
-        let mut shadow = Shadow { body, standings, edges: [0..0, 0..0], fronts: [0..0, 0..0] };
+        let nothing = [mark.edges..mark.edges, mark.edges..mark.edges];
+        let no_fronts = [mark.fronts..mark.fronts, mark.fronts..mark.fronts];
+        let mut shadow = Shadow { body, standings, edges: nothing, fronts: no_fronts };
+        let size =
+            (sets[0].corners[0] - sets[1].corners[0]).length() + 2.0 * (sets[0].radius + sets[1].radius);
         for way in [0, 1] {
+            if only.is_some_and(|only| only as usize != way) {
+                continue;
+            }
             let (edges_start, fronts_start) = (self.edges.len(), self.fronts.len());
-            let (receiver, source) = (sets[way], sets[1 - way]);
+            let (receiver, source) = (sets[way].corners, sets[1 - way].corners);
             for k in 0..body.faces.len() {
                 let at = |set: usize| self.standings[shadow.standings[set].start + k];
                 if at(way) >= 0 && at(1 - way) >= 0 {
@@ -216,7 +226,7 @@ impl<'a> Shadows<'a> {
             let candidates = parent.map_or(0..body.edges.len(), |parent| parent.edges[way].clone());
             for candidate in candidates {
                 let k = if parent.is_some() { self.edges[candidate] } else { candidate as u32 };
-                match self.cut(&body.edges[k as usize], base, receiver, source) {
+                match self.cut(&body.edges[k as usize], base, receiver, source, size) {
                     Cut::Outside => return Blocking::Nothing,
                     Cut::Across => self.edges.push(k),
                     Cut::Inside => {}
@@ -235,7 +245,7 @@ impl<'a> Shadows<'a> {
     }
 
     /// Where the source lies relative to the planes through the receiver's points and an edge.
-    fn cut(&self, edge: &BodyEdge, base: usize, receiver: &[DVec3], source: &[DVec3]) -> Cut {
+    fn cut(&self, edge: &BodyEdge, base: usize, receiver: &[DVec3], source: &[DVec3], size: f64) -> Cut {
         let (left, right) = (self.standings[base + edge.left], self.standings[base + edge.right]);
         // Both faces in front, or both behind: never a silhouette.
         if left * right == 1 {
@@ -243,13 +253,29 @@ impl<'a> Shadows<'a> {
         }
         let is_known = left != 0 || right != 0;
         let inward = if left == 1 || right == -1 { -1.0 } else { 1.0 };
-        let (low, high) = volumes(edge.from, edge.to, receiver, source, inward);
-        if is_known && low >= 0.0 {
-            Cut::Inside
-        } else if left * right == -1 && high <= 0.0 {
-            Cut::Outside
-        } else {
-            Cut::Across
+        match volumes(edge.from, edge.to, receiver, source, size) {
+            Sign::Both => Cut::Across,
+            Sign::None => {
+                if is_known {
+                    Cut::Inside
+                } else {
+                    Cut::Across
+                }
+            }
+            Sign::One(sign) if sign * inward > 0.0 => {
+                if is_known {
+                    Cut::Inside
+                } else {
+                    Cut::Across
+                }
+            }
+            Sign::One(_) => {
+                if left * right == -1 {
+                    Cut::Outside
+                } else {
+                    Cut::Across
+                }
+            }
         }
     }
 
@@ -287,12 +313,14 @@ impl<'a> Shadows<'a> {
     /// How many planes through an edge that cuts the source and a corner of the source cross the receiver.
     pub fn crossings(&self, which: Range<usize>, from: From, receiver: &[DVec3], source: &[DVec3]) -> usize {
         let mut count = 0;
+        let size =
+            polygon::diameter(receiver) + polygon::diameter(source) + (receiver[0] - source[0]).length();
         for at in which {
             self.for_each_edge(at, from, |edge| {
                 for corner in source {
                     let corner = std::slice::from_ref(corner);
-                    let (low, high) = volumes(edge.from, edge.to, receiver, corner, 1.0);
-                    count += usize::from(low < 0.0 && high > 0.0);
+                    let sign = volumes(edge.from, edge.to, receiver, corner, size);
+                    count += usize::from(matches!(sign, Sign::Both));
                 }
             });
         }
@@ -326,22 +354,46 @@ enum Cut {
     Across,
 }
 
-/// Least and largest `inward` g(x, y) over the corners of two sets, those without a sign as 0.
-fn volumes(from: DVec3, to: DVec3, receiver: &[DVec3], source: &[DVec3], inward: f64) -> (f64, f64) {
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    let mut reach = 0.0f64;
-    for &x in receiver {
-        let (a, b) = (from - x, to - x);
-        let normal = inward * a.cross(b);
-        for &y in source {
-            let between = y - x;
-            let volume = normal.dot(between);
-            (low, high) = (low.min(volume), high.max(volume));
-            reach = reach.max(between.length_squared());
+/// Signs of g over the corners of two sets.
+enum Sign {
+    /// All zero to rounding.
+    None,
+    /// 1 or -1, or zero.
+    One(f64),
+    /// Both.
+    Both,
+}
+
+/// Signs of g(x, y) over the corners of two sets that fit into `size`. With x and y taken from the edge's start, g is
+/// x . (y x l): one cross product per y, one scalar product per pair.
+fn volumes(from: DVec3, to: DVec3, receiver: &[DVec3], source: &[DVec3], size: f64) -> Sign {
+    /// Corners of the source looked at together.
+    const LANES: usize = 4;
+    let along = to - from;
+    let reach = size + (from - receiver[0]).length();
+    let rounding = EDGE_ROUNDING * reach * reach * along.length();
+    let (mut low, mut high) = ([0.0f64; LANES], [0.0f64; LANES]);
+    for group in source.chunks(LANES) {
+        let (mut wx, mut wy, mut wz) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for (k, &y) in group.iter().enumerate() {
+            let w = (y - from).cross(along);
+            (wx[k], wy[k], wz[k]) = (w.x, w.y, w.z);
         }
-        reach = reach.max(a.length_squared());
+        for &x in receiver {
+            let x = x - from;
+            for k in 0..LANES {
+                let volume = x.x * wx[k] + x.y * wy[k] + x.z * wz[k];
+                low[k] = if volume < low[k] { volume } else { low[k] };
+                high[k] = if volume > high[k] { volume } else { high[k] };
+            }
+        }
     }
-    let rounding = EDGE_ROUNDING * reach * (to - from).length();
-    let sign = |volume: f64| if volume.abs() <= rounding { 0.0 } else { volume };
-    (sign(low), sign(high))
+    let low = low.iter().fold(0.0, |least: f64, &x| if x < least { x } else { least });
+    let high = high.iter().fold(0.0, |most: f64, &x| if x > most { x } else { most });
+    match (low < -rounding, high > rounding) {
+        (false, false) => Sign::None,
+        (true, true) => Sign::Both,
+        (true, false) => Sign::One(-1.0),
+        (false, true) => Sign::One(1.0),
+    }
 }

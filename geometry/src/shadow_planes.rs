@@ -44,9 +44,15 @@ pub fn shadow_planes(
     planes.clear();
     let tolerance = WORTHLESS_CUT * polygon::diameter(receiver);
     let mut push = |apex: DVec3, from: DVec3, to: DVec3, kind: Kind| {
-        let normal = (from - apex).cross(to - apex).normalize_or_zero();
-        let plane = ShadowPlane { apex, from, to, normal, kind };
-        if normal != DVec3::ZERO && plane.cut_balance(receiver, tolerance).is_some() {
+        let normal = (from - apex).cross(to - apex);
+        // Most planes pass the receiver by: that needs no unit normal.
+        let is_above = |p: &DVec3| normal.dot(*p - apex) > 0.0;
+        let count = receiver.iter().filter(|p| is_above(p)).count();
+        if count == 0 || count == receiver.len() {
+            return;
+        }
+        let plane = ShadowPlane { apex, from, to, normal: normal.normalize_or_zero(), kind };
+        if plane.normal != DVec3::ZERO && plane.cut_balance(receiver, tolerance).is_some() {
             planes.push(plane);
         }
     };

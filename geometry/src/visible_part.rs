@@ -44,6 +44,7 @@ pub struct Scratch {
     rest: Vec<DVec3>,
     cut: Vec<DVec3>,
     half_spaces: Vec<HalfSpace>,
+    heights: Vec<f64>,
 }
 
 /// Form factor from a surface element at `point` with unit `normal` to the front of a convex polygon that lies above the
@@ -57,7 +58,7 @@ pub fn visible_factor(
     from: From,
     scratch: &mut Scratch,
 ) -> f64 {
-    let Scratch { pieces, next, rest, cut, half_spaces } = scratch;
+    let Scratch { pieces, next, rest, cut, half_spaces, heights } = scratch;
     pieces.clear();
     pieces.points.extend(corners.iter().map(|&c| c - point));
     pieces.ends.push(corners.len());
@@ -67,7 +68,7 @@ pub fn visible_factor(
         }
         next.clear();
         for piece in pieces.iter() {
-            subtract(piece, half_spaces, next, rest, cut);
+            subtract(piece, half_spaces, next, rest, cut, heights);
         }
         std::mem::swap(pieces, next);
         if pieces.ends.is_empty() {
@@ -84,32 +85,26 @@ fn subtract(
     out: &mut Pieces,
     rest: &mut Vec<DVec3>,
     cut: &mut Vec<DVec3>,
+    heights: &mut Vec<f64>,
 ) {
-    let value = |space: &HalfSpace, r: DVec3| space.normal.dot(r) + space.offset;
-    // Wholly outside one of them: nothing is hidden, and the piece stays whole.
-    if half_spaces.iter().any(|space| piece.iter().all(|&r| value(space, r) <= 0.0)) {
-        out.push(piece);
-        return;
-    }
+    let first = (out.points.len(), out.ends.len());
     rest.clear();
     rest.extend_from_slice(piece);
-    let first = (out.points.len(), out.ends.len());
     for space in half_spaces {
-        if rest.iter().all(|&r| value(space, r) >= 0.0) {
+        heights.clear();
+        heights.extend(rest.iter().map(|&r| space.normal.dot(r) + space.offset));
+        if heights.iter().all(|&h| h >= 0.0) {
             continue;
         }
-        polygon::clip_both(rest, |r| value(space, r), cut, &mut out.points);
-        let end = out.points.len();
-        if end > out.ends.last().copied().unwrap_or(0) {
-            out.ends.push(end);
-        }
-        std::mem::swap(rest, cut);
-        if rest.is_empty() {
+        if heights.iter().all(|&h| h <= 0.0) {
             // Nothing is hidden after all: the piece stays whole instead of in parts.
             out.points.truncate(first.0);
             out.ends.truncate(first.1);
             out.push(piece);
             return;
         }
+        polygon::cut_in_two(rest, heights, cut, &mut out.points);
+        out.ends.push(out.points.len());
+        std::mem::swap(rest, cut);
     }
 }
