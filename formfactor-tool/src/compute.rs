@@ -50,7 +50,6 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
         pairs.par_iter().map(compute).collect()
     });
     bar.finish_and_clear();
-    eprintln!("{:?}", geometry::occluded::STAT);
 
     let mut counts = Counts {
         same_plane: settled.same_plane,

@@ -14,7 +14,7 @@ use std::ops::Range;
 /// What the descent finds. Pairs it does not mention are zero.
 pub trait Findings {
     /// Nothing stands between any of the rows and any of the columns; they need not see each other's front.
-    fn clear(&mut self, rows: Range<usize>, columns: Range<usize>, counts: &mut Counts);
+    fn clear(&mut self, first: &Cluster, second: &Cluster, counts: &mut Counts);
 
     /// Something stands between two clusters. `true` where nothing more needs to be known of them.
     fn undecided(&mut self, _: &Cluster, _: &Cluster) -> bool {
@@ -82,7 +82,7 @@ impl<'a, F: Findings> Descent<'a, '_, F> {
         } else {
             let now = start..scratch.shadows.len();
             if now.is_empty() && still_pending.is_empty() {
-                self.findings.clear(first.range.clone(), second.range.clone(), self.counts);
+                self.findings.clear(first, second, self.counts);
             } else if self.findings.undecided(first, second) {
                 // Looked at closely enough.
             } else if let Some(children) = children(first, second, a, b) {
@@ -90,7 +90,7 @@ impl<'a, F: Findings> Descent<'a, '_, F> {
                     self.visit(c, d, now.clone(), &still_pending, scratch);
                 }
             } else {
-                self.single((first.range.start, second.range.start), now, scratch);
+                self.single(first, second, now, scratch);
             }
         }
         scratch.shadows.truncate(start);
@@ -139,7 +139,8 @@ impl<'a, F: Findings> Descent<'a, '_, F> {
         false
     }
 
-    fn single(&mut self, (i, j): (usize, usize), which: Range<usize>, scratch: &mut Scratch<'a>) {
+    fn single(&mut self, first: &Cluster, second: &Cluster, which: Range<usize>, scratch: &mut Scratch<'a>) {
+        let (i, j) = (first.range.start, second.range.start);
         let Some(pair) = InFront::new(&self.scene.patches[i], &self.scene.patches[j]) else {
             self.counts.behind += 1;
             return;
@@ -152,7 +153,7 @@ impl<'a, F: Findings> Descent<'a, '_, F> {
                     self.counts.covered += 1;
                     return;
                 }
-                View::Clear => return self.findings.clear(i..i + 1, j..j + 1, self.counts),
+                View::Clear => return self.findings.clear(first, second, self.counts),
                 View::Partial => now = start..scratch.shadows.len(),
             }
         }

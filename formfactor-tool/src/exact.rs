@@ -7,12 +7,18 @@
 use crate::counts::Counts;
 use crate::descent::{Findings, descend};
 use crate::estimator::{Estimator, TileBuilder};
+use crate::poses::Poses;
 use crate::scene::{Cluster, Scene};
-use crate::skips::Skips;
+use crate::skips::{Skip, Skips};
 use crate::tile::Tile;
 use crate::traversal::LeafPair;
+use geometry::area_rule::kernel_sum;
+use geometry::contour::{Exchange, contour};
+use geometry::far::FarPatches;
 use geometry::occluded::Wanted;
 use geometry::pair::{InFront, Scratch};
+use geometry::patch::Patch;
+use geometry::unoccluded::{Facing, Rule, exchange_in_front, facing, mutual_parts};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -24,7 +30,11 @@ const UNOCCLUDED_SHARE: f64 = 0.3;
 /// 1 / (1 - rho) times.
 const UNOCCLUDED_LOOSEST: f64 = 2e-3;
 /// Share of a row's error given to partly occluded pairs.
-const OCCLUDED_SHARE: f64 = 1.5;
+const OCCLUDED_SHARE: f64 = 0.7;
+/// A partly occluded pair that may take more than this part of a row's error has to keep its own.
+const DOMINANT_SHARE: f64 = 0.02;
+/// Below this tolerance poses are not rounded: 1e-12 of a factor is to be had.
+const POSE_TOLERANCE: f64 = 1e-8;
 /// Most visible parts for one pair: a pair of whole walls behind a box needs some 10^5 for 12 digits.
 const MOST_EVALUATIONS: usize = 400_000;
 
@@ -33,10 +43,22 @@ const MOST_EVALUATIONS: usize = 400_000;
 pub struct Exact<'a> {
     scene: &'a Scene,
     skips: &'a Skips,
+    /// Error asked of each row.
+    tolerance: f64,
     /// Relative error of an unoccluded factor.
     unoccluded: f64,
     /// Per row: error of a partly occluded factor, relative to the factor without blockers.
     occluded: Vec<f64>,
+    far: Far,
+    /// Near pairs by their pose, where the tolerance leaves room for a pose's rounding.
+    poses: Option<Poses>,
+}
+
+/// The patches as the rules for far pairs see them.
+#[derive(Debug)]
+struct Far {
+    low: FarPatches,
+    middle: FarPatches,
 }
 
 impl<'a> Exact<'a> {
@@ -45,13 +67,23 @@ impl<'a> Exact<'a> {
         let sizes = occluded_sizes(scene, skips, pairs);
         let occluded = sizes.iter().map(|&size| OCCLUDED_SHARE * tolerance / size.max(tolerance)).collect();
         let unoccluded = (UNOCCLUDED_SHARE * tolerance).min(UNOCCLUDED_LOOSEST);
-        Self { scene, skips, unoccluded, occluded }
+        let far = Far { low: FarPatches::low(&scene.patches), middle: FarPatches::middle(&scene.patches) };
+        let poses =
+            (tolerance >= POSE_TOLERANCE).then(|| Poses::new(unoccluded, skips.has(Skip::EqualPoses)));
+        Self { scene, skips, tolerance, unoccluded, occluded, far, poses }
+    }
+
+    /// Exchange factor of two patches wholly in front of each other, by the contour whatever their distance.
+    fn contour(&self, p: &Patch, q: &Patch) -> Exchange {
+        let about = kernel_sum(&p.low, p.plane.normal, &q.low, q.plane.normal);
+        contour(&p.corners, &q.corners, self.unoccluded * about)
     }
 }
 
 impl Estimator for Exact<'_> {
     fn tile(&self, pair: &LeafPair) -> Tile {
-        let mut filling = Filling { exact: self, pair, builder: TileBuilder::zeros(pair) };
+        let builder = TileBuilder::zeros(pair);
+        let mut filling = Filling { exact: self, pair, builder, pending: Vec::new(), too_near: Vec::new() };
         let mut counts = Counts::default();
         descend(self.scene, self.skips, pair, &mut filling, &mut counts, &mut Scratch::default());
         *filling.builder.counts() = counts;
@@ -68,21 +100,78 @@ struct Filling<'e> {
     exact: &'e Exact<'e>,
     pair: &'e LeafPair,
     builder: TileBuilder,
+    pending: Vec<u32>,
+    too_near: Vec<u32>,
+}
+
+impl Filling<'_> {
+    fn set(&mut self, i: usize, j: usize, found: Exchange) {
+        let (row, column) = (i - self.pair.rows.start, j - self.pair.columns.start);
+        self.builder.set(row, column, found.value, found.error);
+    }
+
+    /// A row of pairs that see each other wholly: far ones together, those that are too near for a rule by the next one.
+    fn row_in_front(&mut self, i: usize, columns: Range<usize>, counts: &mut Counts) {
+        let relative = self.exact.unoccluded;
+        let mut pending = std::mem::take(&mut self.pending);
+        let mut too_near = std::mem::take(&mut self.too_near);
+        pending.clear();
+        pending.extend(columns.map(|j| j as u32));
+        let far = &self.exact.far;
+        for (patches, served) in [(&far.low, Rule::Low), (&far.middle, Rule::Middle)] {
+            too_near.clear();
+            patches.factors(i, &pending, |at, value, error| {
+                if error <= relative * value {
+                    counts.add_unoccluded(served);
+                    self.set(i, pending[at] as usize, Exchange { value, error });
+                } else {
+                    too_near.push(pending[at]);
+                }
+            });
+            std::mem::swap(&mut pending, &mut too_near);
+        }
+        for &j in &pending {
+            let (p, q) = (&self.exact.scene.patches[i], &self.exact.scene.patches[j as usize]);
+            let found = self.exact.poses.as_ref().and_then(|poses| poses.exchange(p, q));
+            let (found, rule) = found.unwrap_or_else(|| exchange_in_front(p, q, relative));
+            counts.add_unoccluded(rule);
+            self.set(i, j as usize, found);
+        }
+        (self.pending, self.too_near) = (pending, too_near);
+    }
 }
 
 impl Findings for Filling<'_> {
-    fn clear(&mut self, rows: Range<usize>, columns: Range<usize>, counts: &mut Counts) {
+    fn clear(&mut self, first: &Cluster, second: &Cluster, counts: &mut Counts) {
+        let (rows, columns) = (first.range.clone(), second.range.clone());
+        if first.faces(second) && second.faces(first) && self.exact.skips.has(Skip::FarRules) {
+            for i in rows {
+                self.row_in_front(i, columns.clone(), counts);
+            }
+            return;
+        }
         let patches = &self.exact.scene.patches;
         for i in rows {
             for j in columns.clone() {
-                let Some(pair) = InFront::new(&patches[i], &patches[j]) else {
-                    counts.behind += 1;
-                    continue;
-                };
-                let (found, rule) = pair.unoccluded(self.exact.unoccluded);
-                counts.add_unoccluded(rule);
-                let (row, column) = (i - self.pair.rows.start, j - self.pair.columns.start);
-                self.builder.set(row, column, found.value, found.error);
+                match facing(&patches[i], &patches[j]) {
+                    Facing::Away => counts.behind += 1,
+                    Facing::Full if self.exact.skips.has(Skip::FarRules) => {
+                        self.row_in_front(i, j..j + 1, counts)
+                    }
+                    Facing::Full => {
+                        let exchange = self.exact.contour(&patches[i], &patches[j]);
+                        counts.add_unoccluded(Rule::Contour);
+                        self.set(i, j, exchange);
+                    }
+                    Facing::Cut => match mutual_parts(&patches[i], &patches[j]) {
+                        None => counts.behind += 1,
+                        Some((p, q)) => {
+                            let (found, rule) = exchange_in_front(&p, &q, self.exact.unoccluded);
+                            counts.add_unoccluded(rule);
+                            self.set(i, j, found);
+                        }
+                    },
+                }
             }
         }
     }
@@ -96,12 +185,15 @@ impl Findings for Filling<'_> {
         scratch: &mut Scratch<'_>,
     ) {
         let unblocked = pair.unblocked_size();
-        let tolerance = self.exact.occluded[i].min(self.exact.occluded[j]) * unblocked;
-        let wanted = Wanted { tolerance, unblocked, most_evaluations: MOST_EVALUATIONS };
+        let allowed = &self.exact.occluded;
+        let tolerance = allowed[i].min(allowed[j]) * unblocked;
+        let (p, q) = pair.patches();
+        let share = unblocked / p.area.min(q.area) * allowed[i].max(allowed[j]);
+        let alone = share > DOMINANT_SHARE * self.exact.tolerance;
+        let wanted = Wanted { tolerance, unblocked, alone, most_evaluations: MOST_EVALUATIONS };
         let (found, effort) = pair.occluded(which, wanted, scratch);
         counts.add_occluded(effort);
-        let (row, column) = (i - self.pair.rows.start, j - self.pair.columns.start);
-        self.builder.set(row, column, found.value, found.error);
+        self.set(i, j, found);
     }
 }
 
@@ -118,7 +210,7 @@ struct Sizes<'e> {
 }
 
 impl Findings for Sizes<'_> {
-    fn clear(&mut self, _: Range<usize>, _: Range<usize>, _: &mut Counts) {}
+    fn clear(&mut self, _: &Cluster, _: &Cluster, _: &mut Counts) {}
 
     fn undecided(&mut self, first: &Cluster, second: &Cluster) -> bool {
         let (Some(p), Some(q)) = (first.plane, second.plane) else { return false };

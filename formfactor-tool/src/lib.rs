@@ -12,6 +12,7 @@ pub mod estimator;
 pub mod exact;
 pub mod export;
 pub mod info;
+pub mod poses;
 pub mod scene;
 pub mod skips;
 pub mod store;

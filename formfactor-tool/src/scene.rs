@@ -9,6 +9,7 @@ use geometry::occluder::Occluder;
 use geometry::patch::Patch;
 use geometry::plane::{PLANARITY, Plane};
 use geometry::shadow::Set;
+use geometry::unoccluded::HEIGHT_ROUNDING;
 use glam::DVec3;
 use interchange::ids::ElementId;
 use interchange::mesh::Mesh;
@@ -173,6 +174,13 @@ impl Cluster {
     pub fn turns_away_from(&self, other: &Cluster) -> bool {
         let tolerance = PLANARITY * self.radius.max(other.radius);
         self.plane.is_some_and(|plane| other.hull.iter().all(|&c| plane.distance(c) <= tolerance))
+    }
+
+    /// Whether all of `other` lies at or in front of the plane that all of this cluster looks from.
+    pub fn faces(&self, other: &Cluster) -> bool {
+        let rounding =
+            HEIGHT_ROUNDING * (self.radius + other.radius + (self.hull[0] - other.hull[0]).length());
+        self.plane.is_some_and(|plane| other.hull.iter().all(|&c| plane.distance(c) >= -rounding))
     }
 
     /// Whether the body lies at or behind the plane that all of this cluster looks from.

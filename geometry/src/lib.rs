@@ -3,12 +3,11 @@
 //! Knows no file and no radiosity. All lengths are relative: nothing here compares with an absolute epsilon, so a
 //! scene scaled by any factor gives the same answers.
 
-#![forbid(unsafe_code)]
-
 pub mod area_rule;
 pub mod body;
 pub mod contour;
 pub mod edge_pair;
+pub mod far;
 pub mod gather;
 pub mod merge;
 pub mod occluded;

@@ -13,12 +13,23 @@ use std::ops::Range;
 
 /// Points a side of the rules of rising order.
 const ORDERS: [usize; 3] = [2, 4, 8];
-/// Share of the distance between two orders that counts as the error of the higher one. Over a smooth cell the true share
-/// is far smaller.
-const ORDER_ERROR: f64 = 0.1;
+/// The factor by which the distance between orders fell counts this many times in the error of the higher order: the next
+/// one may be less lucky.
+const DECAY_ERROR: f64 = 5.0;
+/// A distance may be small by chance: it never counts less than this many times.
+const LEAST_DECAY: f64 = 0.05;
+/// Distances between orders that fall more slowly than this speak of a singularity at the cell's border (an edge that both
+/// patches touch): halving the cell helps more.
+const SLOW_DECAY: f64 = 0.1;
 /// Over a smooth cell the 2 x 2 rule errs like the square of its distance from the centre's value, relative to the value:
 /// that distance is the second order term, the error the fourth. The factor covers the worst of 10^5 cells.
 const SMOOTH_ERROR: f64 = 4.0;
+/// Second order terms may cancel, so that the centre agrees by chance. Then the fourth power of the relative variation v of
+/// the values tells: the 2 x 2 rule's error counts at least this many times v^4, and need not count more than
+/// [`MOST_VARIATION_ERROR`] (both relative to the value).
+const VARIATION_ERROR: f64 = 0.01;
+/// Most that the variation alone counts.
+const MOST_VARIATION_ERROR: f64 = 3e-5;
 /// Where shadow lines cross a cell, its points may all miss what lies between them: that much of the unblocked
 /// factor is never ruled out.
 const UNSEEN: f64 = 0.02;
@@ -52,6 +63,9 @@ pub struct Wanted {
     pub tolerance: f64,
     /// About the factor without blockers.
     pub unblocked: f64,
+    /// Whether its error must hold by itself. Among many factors of a row estimates that are too low by chance are made up
+    /// for by the others.
+    pub alone: bool,
     /// Most visible parts to compute.
     pub most_evaluations: usize,
 }
@@ -67,8 +81,10 @@ struct Cell {
     order: usize,
     /// Whether shadow planes may still cross it.
     crossed: bool,
-    /// Whether its corners see something that its points do not.
-    bent: bool,
+    /// Distance of the value from the one by the order before.
+    distance: f64,
+    /// Whether higher orders do not help: there is a bend or a singularity inside or at the border.
+    is_rough: bool,
     area: f64,
     /// Order of creation: makes the queue's order unique.
     serial: usize,
@@ -116,6 +132,9 @@ struct Integral<'s, 'a> {
     /// Sum of the cells' errors, and number of cells made.
     error: f64,
     made: usize,
+    /// Least and largest value seen in the present cell.
+    low: f64,
+    high: f64,
 }
 
 /// Exchange factor of `receiver` and the polygon `source`, each wholly in front of the other, behind the shadows `which`;
@@ -131,7 +150,6 @@ pub fn exchange(
     let corners = receiver.corners;
     let normal = receiver.normal.unwrap_or_else(|| polygon::vector_area(corners).normalize_or_zero());
     let base = shadows.len();
-    let base_count = which.len();
     scratch.corners.clear();
     scratch.corners.extend_from_slice(corners);
     scratch.cells.clear();
@@ -150,6 +168,8 @@ pub fn exchange(
         evaluations: 0,
         error: 0.0,
         made: 0,
+        low: 0.0,
+        high: 0.0,
     };
     let whole = Cell {
         corners: 0..corners.len(),
@@ -160,19 +180,6 @@ pub fn exchange(
     };
     integral.run(whole, &planes);
     let evaluations = integral.evaluations;
-    {
-        use std::sync::atomic::Ordering::Relaxed;
-        let k = base_count.min(3);
-        STAT[k][0].fetch_add(1, Relaxed);
-        STAT[k][1].fetch_add(evaluations as u64, Relaxed);
-        STAT[k][2].fetch_add(planes.len() as u64, Relaxed);
-        STAT[k][3].fetch_add(integral.scratch.cells.len() as u64, Relaxed);
-        STAT[k][4].fetch_add(integral.scratch.cells.iter().filter(|c| c.order > 0).count() as u64, Relaxed);
-        STAT[k][5].fetch_add(
-            integral.scratch.cells.iter().filter(|c| c.shadows.is_empty()).count() as u64,
-            Relaxed,
-        );
-    }
     shadows.truncate(base);
     scratch.planes = planes;
 
@@ -229,7 +236,7 @@ impl Integral<'_, '_> {
                 }
                 None => self.raise(Cell { crossed: false, ..cell }),
             }
-        } else if cell.order + 1 < ORDERS.len() && !cell.bent {
+        } else if cell.order + 1 < ORDERS.len() && !cell.is_rough {
             self.raise(cell);
         } else {
             let corners = &self.scratch.corners[cell.corners.clone()];
@@ -245,12 +252,16 @@ impl Integral<'_, '_> {
         }
     }
 
-    /// Applies the next higher order to a cell.
+    /// Applies the next higher order to a cell. Where the distance between orders falls by a factor each time, the error of
+    /// the higher one is the distance times that factor.
     fn raise(&mut self, mut cell: Cell) {
         cell.order += 1;
         let value = self.integrate(&cell, ORDERS[cell.order]);
-        cell.error = ORDER_ERROR * (value - cell.value).abs();
-        cell.value = value;
+        let distance = (value - cell.value).abs();
+        let decay = if cell.distance > 0.0 { distance / cell.distance } else { 0.0 };
+        cell.error = distance * (DECAY_ERROR * decay).clamp(LEAST_DECAY, 1.0);
+        cell.is_rough |= decay > SLOW_DECAY;
+        (cell.value, cell.distance) = (value, distance);
         self.keep(cell);
     }
 
@@ -300,23 +311,28 @@ impl Integral<'_, '_> {
 
     /// Integrates over a new cell and estimates the error.
     fn add(&mut self, mut cell: Cell) {
+        (self.low, self.high) = (f64::INFINITY, 0.0);
         let value = self.integrate(&cell, ORDERS[0]);
         let centre = polygon::centroid(&self.scratch.corners[cell.corners.clone()]);
         let middle = cell.area * self.at(centre, cell.shadows.clone());
         let distance = (value - middle).abs();
-        cell.value = value;
+        (cell.value, cell.distance) = (value, distance);
         cell.error = if cell.crossed {
             distance.max(UNSEEN * cell.area / self.receiver_area * self.wanted.unblocked)
         } else if cell.shadows.len() < 2 {
-            distance.min(SMOOTH_ERROR * distance * distance / value.max(middle).max(f64::MIN_POSITIVE))
+            let size = value.max(middle).max(f64::MIN_POSITIVE);
+            let variation = (self.high - self.low) * cell.area / size;
+            let varied = (VARIATION_ERROR * variation.powi(4)).min(MOST_VARIATION_ERROR);
+            let smooth = if self.wanted.alone { 1.0 } else { SMOOTH_ERROR * distance / size };
+            (distance * smooth.min(1.0)).max(varied * size)
         } else {
             // Edges of different bodies that seem to cross (EEE) are in no shadow plane: what they let through or take
             // away shows first in the cell's corners.
             let corners = cell.corners.len() as f64;
             let outer: f64 = cell.corners.clone().map(|k| self.near_corner(k, centre, &cell)).sum();
             let tip = (value - cell.area * outer / corners).abs();
-            cell.bent = tip > BENT * distance;
-            (KINK * distance).max(if cell.bent { CORNER_ERROR * tip } else { 0.0 })
+            cell.is_rough = tip > BENT * distance;
+            (KINK * distance).max(if cell.is_rough { CORNER_ERROR * tip } else { 0.0 })
         };
         self.keep(cell);
     }
@@ -350,7 +366,10 @@ impl Integral<'_, '_> {
     fn at(&mut self, point: DVec3, shadows: Range<usize>) -> f64 {
         self.evaluations += 1;
         let scratch = &mut self.scratch.visible;
-        visible_factor(point, self.normal, self.source.corners, self.shadows, shadows, self.from, scratch)
+        let (source, from) = (self.source.corners, self.from);
+        let seen = visible_factor(point, self.normal, source, self.shadows, shadows, from, scratch);
+        (self.low, self.high) = (self.low.min(seen), self.high.max(seen));
+        seen
     }
 
     /// n x n Gauss points on each quadrilateral of a fan, squeezed into triangles.
@@ -381,6 +400,3 @@ impl Integral<'_, '_> {
         value
     }
 }
-
-pub static STAT: [[std::sync::atomic::AtomicU64; 6]; 4] =
-    [const { [const { std::sync::atomic::AtomicU64::new(0) }; 6] }; 4];
