@@ -60,6 +60,7 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     tiles.iter().for_each(|tile| counts.add(&tile.counts));
     let matrix = report.phase("assemble", || store::assemble(&scene, &pairs, &tiles, tolerance));
     note(&mut report, &mesh, &scene, &matrix, &counts, tolerance);
+    estimator.note(&mut report);
     report.count("tests of occluders against shafts of clusters", settled.shaft_tests);
     report.phase("write", || store::write(&request.output, digest, &matrix, tolerance))?;
     report.write_beside(&request.output)?;
@@ -82,6 +83,8 @@ fn note(
     report.count("elements", n);
     report.count("occluders", mesh.occluders.len());
     report.count("occluders after merging", scene.occluders.len());
+    report.count("bodies that block", scene.bodies.len());
+    report.count("convex enclosure (all visibility skipped)", usize::from(scene.convex));
     report.count("pairs", n * (n + 1) / 2);
     counts.note(report);
     report.count("blocks", matrix.blocks.len());

@@ -21,6 +21,8 @@ pub struct Counts {
     pub visible_parts: usize,
     /// Occluded pairs whose evaluations ran out.
     pub exhausted: usize,
+    /// Pairs computed from both sides.
+    pub computed_twice: usize,
 }
 
 impl Counts {
@@ -54,6 +56,7 @@ impl Counts {
         self.occluded += other.occluded;
         self.visible_parts += other.visible_parts;
         self.exhausted += other.exhausted;
+        self.computed_twice += other.computed_twice;
     }
 
     /// Writes the counters into a report.
@@ -67,6 +70,7 @@ impl Counts {
         }
         report.count("pairs partly occluded", self.occluded);
         report.count("pairs partly occluded, out of evaluations", self.exhausted);
+        report.count("pairs computed from both sides", self.computed_twice);
         report.count("visible parts computed", self.visible_parts);
     }
 }

@@ -42,6 +42,7 @@ pub fn descend<'a>(
     scratch: &mut Scratch<'a>,
 ) {
     scratch.shadows.clear();
+    scratch.shadows.keep_covering(!skips.has(Skip::Covered));
     let [a, b] = pair.clusters;
     let mut descent = Descent { scene, skips, findings, counts };
     descent.visit(a, b, 0..0, &pair.blockers, scratch);
@@ -81,7 +82,7 @@ impl<'a, F: Findings> Descent<'a, '_, F> {
             self.counts.covered += pairs;
         } else {
             let now = start..scratch.shadows.len();
-            if now.is_empty() && still_pending.is_empty() {
+            if now.is_empty() && still_pending.is_empty() && self.skips.has(Skip::EmptyShaft) {
                 self.findings.clear(first, second, self.counts);
             } else if self.findings.undecided(first, second) {
                 // Looked at closely enough.
@@ -107,8 +108,7 @@ impl<'a, F: Findings> Descent<'a, '_, F> {
         still_pending: &mut Vec<u32>,
         scratch: &mut Scratch<'a>,
     ) -> bool {
-        let covered = self.skips.has(Skip::Covered);
-        if narrow_all(which, first.set(), second.set(), &mut scratch.shadows) == View::Covered && covered {
+        if narrow_all(which, first.set(), second.set(), &mut scratch.shadows) == View::Covered {
             return true;
         }
         if pending.is_empty() {
@@ -129,8 +129,7 @@ impl<'a, F: Findings> Descent<'a, '_, F> {
             };
             match blocking {
                 Blocking::Nothing => {}
-                Blocking::Everything if covered => return true,
-                Blocking::Everything => {}
+                Blocking::Everything => return true,
                 _ if separated(&shaft, &body.corners) => scratch.shadows.truncate(before),
                 Blocking::Part => {}
                 Blocking::Inside => still_pending.push(k),
@@ -153,7 +152,10 @@ impl<'a, F: Findings> Descent<'a, '_, F> {
                     self.counts.covered += 1;
                     return;
                 }
-                View::Clear => return self.findings.clear(first, second, self.counts),
+                View::Clear if self.skips.has(Skip::EmptyShaft) => {
+                    return self.findings.clear(first, second, self.counts);
+                }
+                View::Clear => now = 0..0,
                 View::Partial => now = start..scratch.shadows.len(),
             }
         }

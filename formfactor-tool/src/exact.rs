@@ -12,7 +12,7 @@ use crate::scene::{Cluster, Scene};
 use crate::skips::{Skip, Skips};
 use crate::tile::Tile;
 use crate::traversal::LeafPair;
-use geometry::area_rule::kernel_sum;
+use geometry::area_rule::{Separation, kernel_sum};
 use geometry::contour::{Exchange, contour};
 use geometry::far::FarPatches;
 use geometry::occluded::Wanted;
@@ -20,6 +20,7 @@ use geometry::pair::{InFront, Scratch};
 use geometry::patch::Patch;
 use geometry::unoccluded::{Facing, Rule, exchange_in_front, facing, mutual_parts};
 use glam::DVec3;
+use interchange::report::Report;
 use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -33,6 +34,10 @@ const UNOCCLUDED_LOOSEST: f64 = 2e-3;
 const OCCLUDED_SHARE: f64 = 0.7;
 /// A partly occluded pair that may take more than this part of a row's error has to keep its own.
 const DOMINANT_SHARE: f64 = 0.02;
+/// Estimates of the others are taken this many times: summed over a row they have been as low as 0.75 of the true error.
+const WARINESS: f64 = 2.0;
+/// So has one whose patches are this near (sizes over distance): what they see of each other is not smooth at a common edge.
+const NEAR: f64 = 0.7;
 /// Below this tolerance poses are not rounded: 1e-12 of a factor is to be had.
 const POSE_TOLERANCE: f64 = 1e-8;
 /// Most visible parts for one pair: a pair of whole walls behind a box needs some 10^5 for 12 digits.
@@ -73,6 +78,15 @@ impl<'a> Exact<'a> {
         Self { scene, skips, tolerance, unoccluded, occluded, far, poses }
     }
 
+    fn one_way(&self, pair: &LeafPair) -> Tile {
+        let builder = TileBuilder::zeros(pair);
+        let mut filling = Filling { exact: self, pair, builder, pending: Vec::new(), too_near: Vec::new() };
+        let mut counts = Counts::default();
+        descend(self.scene, self.skips, pair, &mut filling, &mut counts, &mut Scratch::default());
+        *filling.builder.counts() = counts;
+        filling.builder.finish()
+    }
+
     /// Exchange factor of two patches wholly in front of each other, by the contour whatever their distance.
     fn contour(&self, p: &Patch, q: &Patch) -> Exchange {
         let about = kernel_sum(&p.low, p.plane.normal, &q.low, q.plane.normal);
@@ -82,17 +96,42 @@ impl<'a> Exact<'a> {
 
 impl Estimator for Exact<'_> {
     fn tile(&self, pair: &LeafPair) -> Tile {
-        let builder = TileBuilder::zeros(pair);
-        let mut filling = Filling { exact: self, pair, builder, pending: Vec::new(), too_near: Vec::new() };
-        let mut counts = Counts::default();
-        descend(self.scene, self.skips, pair, &mut filling, &mut counts, &mut Scratch::default());
-        *filling.builder.counts() = counts;
-        filling.builder.finish()
+        let tile = self.one_way(pair);
+        if self.skips.has(Skip::Reciprocity) || pair.is_diagonal() {
+            return tile;
+        }
+        // S_ji computed too, and the mean kept: the same matrix, to rounding and the tolerance.
+        let [a, b] = pair.clusters;
+        let swapped = LeafPair {
+            rows: pair.columns.clone(),
+            columns: pair.rows.clone(),
+            clusters: [b, a],
+            blockers: pair.blockers.clone(),
+        };
+        mean(tile, &self.one_way(&swapped))
     }
 
     fn work(&self, pair: &LeafPair) -> f64 {
         pair.pairs() as f64 * (1.0 + pair.blockers.len() as f64)
     }
+
+    fn note(&self, report: &mut Report) {
+        let distinct = self.poses.as_ref().map_or(0, Poses::distinct);
+        report.count("different poses of near pairs (others skipped)", distinct);
+    }
+}
+
+/// The mean of a tile and its transpose computed apart.
+fn mean(mut tile: Tile, transposed: &Tile) -> Tile {
+    let (rows, columns) = (tile.row_errors.len(), tile.column_errors.len());
+    for i in 0..rows {
+        for j in 0..columns {
+            let value = &mut tile.values[i * columns + j];
+            *value = 0.5 * (*value + transposed.values[j * rows + i]);
+        }
+    }
+    tile.counts.computed_twice += rows * columns;
+    tile
 }
 
 /// Computes what the descent finds.
@@ -189,11 +228,13 @@ impl Findings for Filling<'_> {
         let tolerance = allowed[i].min(allowed[j]) * unblocked;
         let (p, q) = pair.patches();
         let share = unblocked / p.area.min(q.area) * allowed[i].max(allowed[j]);
-        let alone = share > DOMINANT_SHARE * self.exact.tolerance;
+        let near = Separation::new(p, q).theta > NEAR;
+        let alone = near || share > DOMINANT_SHARE * self.exact.tolerance;
         let wanted = Wanted { tolerance, unblocked, alone, most_evaluations: MOST_EVALUATIONS };
         let (found, effort) = pair.occluded(which, wanted, scratch);
         counts.add_occluded(effort);
-        self.set(i, j, found);
+        let wariness = if alone { 1.0 } else { WARINESS };
+        self.set(i, j, Exchange { error: wariness * found.error, ..found });
     }
 }
 

@@ -153,6 +153,7 @@ impl Walk<'_> {
             match shadows.add(body, first.set(), second.set()) {
                 Blocking::Nothing => {}
                 Blocking::Everything if self.skips.has(Skip::Covered) => return None,
+                Blocking::Everything => blockers.push(k),
                 _ if separated(&shaft, &body.corners) => {}
                 _ => blockers.push(k),
             }

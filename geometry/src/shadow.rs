@@ -98,6 +98,8 @@ pub struct Shadows<'a> {
     edges: Vec<u32>,
     fronts: Vec<u32>,
     list: Vec<Shadow<'a>>,
+    /// Whether a body that hides everything is put on the stack like any other.
+    keeps_covering: bool,
 }
 
 /// Lengths of the stack's parts.
@@ -109,6 +111,11 @@ struct Mark {
 }
 
 impl<'a> Shadows<'a> {
+    /// Treats a body that hides everything as one that hides a part: the view is then found dark point by point.
+    pub fn keep_covering(&mut self, keeps: bool) {
+        self.keeps_covering = keeps;
+    }
+
     /// Forgets all.
     pub fn clear(&mut self) {
         self.standings.clear();
@@ -235,7 +242,7 @@ impl<'a> Shadows<'a> {
             shadow.edges[way] = edges_start..self.edges.len();
             shadow.fronts[way] = fronts_start..self.fronts.len();
             // From every point of the receiver the source lies inside the silhouette and behind the front faces.
-            if shadow.edges[way].is_empty() && shadow.fronts[way].is_empty() {
+            if shadow.edges[way].is_empty() && shadow.fronts[way].is_empty() && !self.keeps_covering {
                 self.edges.truncate(mark.edges);
                 return Blocking::Everything;
             }
