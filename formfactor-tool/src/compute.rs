@@ -1,18 +1,21 @@
 //! `compute`: a mesh file in, a matrix file out.
 
-use crate::counts::Counts;
 use crate::estimator::Estimator;
 use crate::exact::Exact;
+use crate::options::{Shard, Storage};
 use crate::scene::Scene;
+use crate::schedule::in_order;
+use crate::shards;
 use crate::skips::{Skip, Skips};
-use crate::store::{self, Assembled};
-use crate::tile::Tile;
-use crate::traversal::leaf_pairs;
-use interchange::atomic_write::refuse_input;
+use crate::store::{Packing, Store, StoredTile};
+use crate::traversal::{LeafPair, leaf_pairs};
+use interchange::atomic_write::{Partial, refuse_input};
+use interchange::digest::Digest;
+use interchange::matrix::{BlockKind, MatrixRecord};
 use interchange::mesh::Mesh;
+use interchange::provenance::Provenance;
 use interchange::report::Report;
 use interchange::tool::{Common, Finish};
-use rayon::prelude::*;
 use std::path::PathBuf;
 
 /// What `compute` is asked for.
@@ -26,7 +29,12 @@ pub struct Request {
     pub tolerance: f64,
     /// Skips turned off.
     pub no_skip: Vec<Skip>,
+    /// How the matrix is stored.
+    pub storage: Storage,
 }
+
+/// Tiles that are computed or wait for their turn take at most this many bytes.
+const IN_FLIGHT: usize = 1 << 28;
 
 /// Computes the matrix of a mesh and writes it with its report.
 pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
@@ -34,67 +42,96 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     let tolerance = request.tolerance;
     let skips = Skips::without(&request.no_skip);
     let mut report = Report::new("formfactor-tool", env!("CARGO_PKG_VERSION"));
-    report.flags.push(format!("--tolerance {tolerance}"));
+    let flags = std::iter::once(format!("--tolerance {tolerance}")).chain(request.storage.flags());
+    report.flags.extend(flags);
     let (mesh, _, digest) = report.phase("read", || Mesh::read(&request.mesh))?;
     let scene = report.phase("prepare", || Scene::new(&mesh, &skips))?;
     let (pairs, settled) = report.phase("traverse", || leaf_pairs(&scene, &skips));
 
     let estimator = Exact::new(&scene, tolerance);
+    let shard = request.storage.shard.unwrap_or(Shard { part: 0, parts: 1 });
+    let all_pairs = pairs.len();
+    let pairs = shards::pairs_of(pairs, &estimator, shard);
+
+    let precision = request.storage.precision(tolerance);
+    let packing = Packing::new(&scene, &skips, precision, tolerance);
+    let record = MatrixRecord {
+        elements: scene.len() as u32,
+        mesh: digest,
+        precision,
+        symmetric: true,
+        extended: false,
+        tolerance,
+        part: shard.part,
+        parts: shard.parts,
+    };
+    let partial = Partial::create(&request.output)?;
+    let mut store = Store::create(partial, provenance(&report.flags, digest), record, packing.areas())?;
+    // Parts count what whole clusters settled once.
+    if shard.part == 0 {
+        store.counts.same_plane += settled.same_plane;
+        store.counts.behind += settled.behind;
+        store.counts.covered += settled.covered;
+    }
     let bar = common.progress("form factors", pairs.len());
-    let tiles: Vec<Tile> = report.phase("pairs", || {
-        let compute = |pair| {
-            let tile = estimator.tile(pair);
+    report.phase("pairs", || {
+        let work = |k: usize| {
+            let tile = packing.pack(&pairs[k], &estimator.tile(&pairs[k]));
             bar.inc(1);
             tile
         };
-        pairs.par_iter().map(compute).collect()
-    });
+        let take = |k: usize, tile: StoredTile| store.add(&pairs[k], &tile);
+        in_order(0..pairs.len(), rayon::current_num_threads(), IN_FLIGHT, |k| bytes(&pairs[k]), work, take)
+    })?;
     bar.finish_and_clear();
 
-    let mut counts = Counts {
-        same_plane: settled.same_plane,
-        behind: settled.behind,
-        covered: settled.covered,
-        ..Counts::default()
-    };
-    tiles.iter().for_each(|tile| counts.add(&tile.counts));
-    let matrix = report.phase("assemble", || store::assemble(&scene, &pairs, &tiles, tolerance));
-    note(&mut report, &mesh, &scene, &matrix, &counts, tolerance);
+    note(&mut report, &mesh, &scene, &store, tolerance);
     report.count("tests of occluders against shafts of clusters", settled.shaft_tests);
-    report.phase("write", || store::write(&request.output, digest, &matrix, tolerance))?;
+    report.count("tiles", pairs.len());
+    report.count("tiles of other shards", all_pairs - pairs.len());
+    let finish = finish(tolerance, &store);
+    report.phase("write", || store.finish())?;
     report.write_beside(&request.output)?;
-    Ok(finish(tolerance, &matrix))
+    Ok(finish)
+}
+
+/// Where a matrix with these flags comes from.
+fn provenance(flags: &[String], mesh: Digest) -> Provenance {
+    let origin = Provenance::new("formfactor-tool", env!("CARGO_PKG_VERSION"));
+    flags.iter().fold(origin, |origin, flag| origin.flag(flag.as_str())).input("mesh", mesh)
+}
+
+/// Bytes a tile may take: its entries as computed and as stored.
+fn bytes(pair: &LeafPair) -> usize {
+    pair.pairs() * 2 * size_of::<f64>()
 }
 
 fn largest(values: &[f64]) -> f64 {
     values.iter().copied().fold(0.0, f64::max)
 }
 
-fn note(
-    report: &mut Report,
-    mesh: &Mesh,
-    scene: &Scene,
-    matrix: &Assembled,
-    counts: &Counts,
-    tolerance: f64,
-) {
+fn note(report: &mut Report, mesh: &Mesh, scene: &Scene, store: &Store, tolerance: f64) {
     let n = scene.len();
     report.count("elements", n);
     report.count("occluders", mesh.occluders.len());
     report.count("occluders after merging", scene.occluders.len());
     report.count("pairs", n * (n + 1) / 2);
-    counts.note(report);
-    report.count("blocks", matrix.blocks.len());
-    report.count("blocks absent", matrix.absent_blocks);
+    store.counts.note(report);
+    let blocks = store.writer.blocks();
+    report.count("blocks", blocks.len());
+    let sparse = blocks.iter().filter(|block| block.kind() == Ok(BlockKind::Sparse)).count();
+    report.count("blocks sparse", sparse);
+    report.count("blocks absent", store.absent_blocks);
+    let row_sums = store.row_sums();
     report.estimate("tolerance asked", tolerance);
-    report.estimate("worst row error", largest(&matrix.row_errors));
-    report.estimate("mean row error", matrix.row_errors.iter().sum::<f64>() / n as f64);
-    report.estimate("largest row sum", largest(&matrix.row_sums));
-    report.estimate("smallest row sum", matrix.row_sums.iter().copied().fold(f64::INFINITY, f64::min));
+    report.estimate("worst row error", largest(&store.row_errors));
+    report.estimate("mean row error", store.row_errors.iter().sum::<f64>() / n as f64);
+    report.estimate("largest row sum", largest(&row_sums));
+    report.estimate("smallest row sum", row_sums.iter().copied().fold(f64::INFINITY, f64::min));
 }
 
-fn finish(tolerance: f64, matrix: &Assembled) -> Finish {
-    let worst = largest(&matrix.row_errors);
+fn finish(tolerance: f64, store: &Store) -> Finish {
+    let worst = largest(&store.row_errors);
     if worst <= tolerance {
         return Finish::Done;
     }

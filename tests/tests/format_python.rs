@@ -144,13 +144,17 @@ fn assert_same_matrix(got: &Value, path: &Path) {
     assert_numbers("tolerance", &got["record"]["tolerance"], [record.tolerance]);
     assert_numbers("areas", &sections["areas"], matrix.areas().unwrap().iter().copied());
     assert_numbers("row_errors", &sections["row_errors"], matrix.row_errors().unwrap().iter().copied());
-    let blocks = matrix.blocks().unwrap().iter().flat_map(|b| {
+    let views = matrix.views().unwrap();
+    let blocks = views.iter().map(|view| view.block).flat_map(|b| {
         let head = [b.row_start, b.rows, b.column_start, b.columns, b.code, b.rank].map(f64::from);
         head.into_iter().chain([b.offset as f64])
     });
     assert_numbers("blocks", &sections["blocks"], blocks);
-    let values = matrix.values().unwrap();
-    assert_numbers("values", &sections["values"], (0..values.len()).map(|i| values.get(i)));
+    let values = views.iter().flat_map(|view| (0..view.values.len()).map(|i| view.values.get(i)));
+    assert_numbers("values", &sections["values"], values);
+    let structure: Vec<f64> = views.iter().flat_map(|view| view.structure).map(|&x| x.into()).collect();
+    // Files of version 1.0 have no such section.
+    assert_numbers("sparse", sections.get("sparse").unwrap_or(&Value::Array(Vec::new())), structure);
     // Sums in another order: a few ulp per term.
     let sums = matrix.row_sums().unwrap();
     assert_eq!(got["row_sums"].as_array().map(Vec::len), Some(sums.len()));
@@ -218,7 +222,7 @@ fn files_of_version_1_0_load() {
     assert_eq!(MaterialTable::read(&files.materials).unwrap().0, two_squares::materials());
     assert_eq!(Solution::read(&files.solution).unwrap().0, two_squares::solution());
     let matrix = Matrix::open(&files.matrix).unwrap();
-    assert_eq!(matrix.values().unwrap().get(0), two_squares::FORM_FACTOR);
+    assert_eq!(matrix.views().unwrap()[0].values.get(0), two_squares::FORM_FACTOR);
     assert_same(&reader(folder.path()), &files);
 }
 
