@@ -1,5 +1,6 @@
 //! `compute`: a mesh file in, a matrix file out.
 
+use crate::closure::{self, Closed};
 use crate::estimator::Estimator;
 use crate::exact::Exact;
 use crate::options::{Shard, Storage};
@@ -85,7 +86,13 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     })?;
     bar.finish_and_clear();
 
-    note(&mut report, &mesh, &scene, &store, tolerance);
+    // A shard alone says nothing of row sums.
+    let closed = match request.storage.shard {
+        None => report.phase("closure", || closure::close(&mut store, request.storage.closure))?,
+        Some(_) => None,
+    };
+    note(&mut report, &mesh, &scene, &store);
+    note_rows(&mut report, &store, closed.as_ref(), tolerance);
     report.count("tests of occluders against shafts of clusters", settled.shaft_tests);
     report.count("tiles", pairs.len());
     report.count("tiles of other shards", all_pairs - pairs.len());
@@ -110,27 +117,35 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().copied().fold(0.0, f64::max)
 }
 
-fn note(report: &mut Report, mesh: &Mesh, scene: &Scene, store: &Store, tolerance: f64) {
+fn note(report: &mut Report, mesh: &Mesh, scene: &Scene, store: &Store) {
     let n = scene.len();
-    report.count("elements", n);
     report.count("occluders", mesh.occluders.len());
     report.count("occluders after merging", scene.occluders.len());
     report.count("pairs", n * (n + 1) / 2);
     store.counts.note(report);
+    report.count("blocks absent", store.absent_blocks);
+}
+
+/// Notes what the rows of a finished matrix say.
+pub(crate) fn note_rows(report: &mut Report, store: &Store, closed: Option<&Closed>, tolerance: f64) {
     let blocks = store.writer.blocks();
+    report.count("elements", store.areas.len());
     report.count("blocks", blocks.len());
     let sparse = blocks.iter().filter(|block| block.kind() == Ok(BlockKind::Sparse)).count();
     report.count("blocks sparse", sparse);
-    report.count("blocks absent", store.absent_blocks);
     let row_sums = store.row_sums();
     report.estimate("tolerance asked", tolerance);
     report.estimate("worst row error", largest(&store.row_errors));
-    report.estimate("mean row error", store.row_errors.iter().sum::<f64>() / n as f64);
+    report.estimate("mean row error", store.row_errors.iter().sum::<f64>() / row_sums.len() as f64);
     report.estimate("largest row sum", largest(&row_sums));
     report.estimate("smallest row sum", row_sums.iter().copied().fold(f64::INFINITY, f64::min));
+    if let Some(closed) = closed {
+        closed.note(report);
+    }
 }
 
-fn finish(tolerance: f64, store: &Store) -> Finish {
+/// How a run with this tolerance ended.
+pub(crate) fn finish(tolerance: f64, store: &Store) -> Finish {
     let worst = largest(&store.row_errors);
     if worst <= tolerance {
         return Finish::Done;

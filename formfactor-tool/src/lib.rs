@@ -6,12 +6,14 @@
 
 #![forbid(unsafe_code)]
 
+pub mod closure;
 pub mod compute;
 pub mod counts;
 pub mod estimator;
 pub mod exact;
 pub mod export;
 pub mod info;
+pub mod merge;
 pub mod options;
 pub mod scene;
 pub mod schedule;

@@ -1,9 +1,10 @@
 //! Command line of the form-factor stage.
 
 use clap::{Parser, Subcommand, ValueEnum};
+use formfactor_tool::closure::Closure;
 use formfactor_tool::options::Storage;
 use formfactor_tool::skips::Skip;
-use formfactor_tool::{compute, export, info};
+use formfactor_tool::{compute, export, info, merge};
 use interchange::grouping::By;
 use interchange::tool::{Common, EXIT_CODES, Finish, exit_code, print_data};
 use std::path::PathBuf;
@@ -39,6 +40,18 @@ enum Command {
         no_skip: Vec<Skip>,
         #[command(flatten)]
         storage: Storage,
+    },
+    /// Put the files of a matrix that was computed in shards together
+    Merge {
+        /// All shards, in any order
+        #[arg(required = true)]
+        shards: Vec<PathBuf>,
+        /// Matrix file to write
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
+        /// Closure in place of the one that the shards were asked for
+        #[arg(long, value_enum)]
+        closure: Option<Closure>,
     },
     /// Write the factors F(i -> j) as a table
     Export {
@@ -76,6 +89,9 @@ fn run(cli: Cli) -> anyhow::Result<Finish> {
         Command::Compute { mesh, output, tolerance, method: Method::Auto, no_skip, storage } => {
             let request = compute::Request { mesh, output, tolerance, no_skip, storage };
             return compute::run(&request, &cli.common);
+        }
+        Command::Merge { shards, output, closure } => {
+            return merge::run(&merge::Request { shards, output, closure }, &cli.common);
         }
         Command::Export { matrix, mesh, by, output } => export::run(&matrix, &mesh, by, &output)?,
         Command::Info { file, json } => print_data(&info::describe(&file, json)?)?,

@@ -1,5 +1,6 @@
 //! Flags of `compute` that say how the matrix is stored, divided and closed.
 
+use crate::closure::Closure;
 use clap::{Args, ValueEnum};
 use interchange::matrix::Precision;
 use std::fmt;
@@ -15,6 +16,10 @@ pub struct Storage {
     /// Stored type of the entries [default: f32 from a tolerance of 1e-6 up, else f64]
     #[arg(long, value_enum)]
     pub precision: Option<PrecisionName>,
+    /// What to do about row sums of a closed scene that are not exactly 1 [default: least-squares where every row sum is
+    /// within its own estimated error of 1, else report]; of shards, merge does it
+    #[arg(long, value_enum)]
+    pub closure: Option<Closure>,
     /// Compute part I of N only, balanced by expected work; merge puts the N files together
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
@@ -34,13 +39,14 @@ impl Storage {
     /// The flags given that change the file, in a fixed order.
     pub fn flags(&self) -> Vec<String> {
         let precision = self.precision.map(|p| format!("--precision {}", name(p)));
+        let closure = self.closure.map(|closure| format!("--closure {}", name(closure)));
         let shard = self.shard.map(|shard| format!("--shard {shard}"));
-        [precision, shard].into_iter().flatten().collect()
+        [precision, closure, shard].into_iter().flatten().collect()
     }
 }
 
 /// How a value of a flag is written.
-fn name(value: impl ValueEnum) -> String {
+pub fn name(value: impl ValueEnum) -> String {
     value.to_possible_value().map_or(String::new(), |value| value.get_name().to_owned())
 }
 

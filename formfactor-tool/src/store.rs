@@ -116,7 +116,9 @@ pub struct Store {
     /// Estimated sum over j of |error of F_ij|.
     pub row_errors: Vec<f64>,
     /// Sum over j of S_ij.
-    sums: Vec<f64>,
+    pub(crate) sums: Vec<f64>,
+    /// Stored type of the entries.
+    pub precision: Precision,
     /// Classes of pairs.
     pub counts: Counts,
     /// Tiles with nothing in them.
@@ -134,12 +136,13 @@ impl Store {
         record: MatrixRecord,
         areas: &[f64],
     ) -> interchange::Result<Self> {
-        let count = areas.len();
+        let (count, precision) = (areas.len(), record.precision);
         Ok(Self {
             writer: MatrixWriter::create(partial, provenance, record, areas)?,
             areas: areas.to_vec(),
             row_errors: vec![0.0; count],
             sums: vec![0.0; count],
+            precision,
             counts: Counts::default(),
             absent_blocks: 0,
         })
@@ -154,6 +157,21 @@ impl Store {
             self.writer.push(packed)?;
         }
         self.note(pair, tile);
+        Ok(())
+    }
+
+    /// Appends a block of another matrix of the same elements and precision; its errors are the caller's business.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn copy(&mut self, view: &BlockView<'_>) -> interchange::Result<()> {
+        self.writer.push(&PackedBlock::copy_of(view))?;
+        let block = &view.block;
+        let elements = |start: u32, count: u32| start as usize..(start + count) as usize;
+        let rows = elements(block.row_start, block.rows);
+        rows.chain(elements(block.column_start, block.columns))
+            .zip(sums_of(view))
+            .for_each(|(i, sum)| self.sums[i] += sum);
         Ok(())
     }
 

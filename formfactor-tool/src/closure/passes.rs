@@ -1,0 +1,242 @@
+//! What closure asks of the blocks on disk: sums over all entries, some blocks in memory at a time, on all cores. The
+//! order of every sum follows the file alone.
+
+use interchange::matrix::{BlockKind, BlockView, MatrixWriter, Precision, Values};
+use rayon::prelude::*;
+
+/// Sums over the entries of a matrix that is being written.
+pub(super) struct Passes<'a> {
+    writer: &'a mut MatrixWriter,
+    count: usize,
+    /// Entries that count as 0, by their place in the file, rising.
+    clamped: Vec<u64>,
+}
+
+/// What replacing the entries did.
+pub(super) struct Replaced {
+    /// Sums over j of the new S_ij.
+    pub sums: Vec<f64>,
+    /// Sums over j of |change of S_ij|.
+    pub changes: Vec<f64>,
+    /// Largest relative change of an entry.
+    pub largest_change: f64,
+}
+
+impl<'a> Passes<'a> {
+    /// Over `count` elements.
+    pub fn new(writer: &'a mut MatrixWriter, count: usize) -> Self {
+        Self { writer, count, clamped: Vec::new() }
+    }
+
+    /// Number of entries that count as 0.
+    pub fn clamped(&self) -> usize {
+        self.clamped.len()
+    }
+
+    /// Sums over j of S_ij.
+    pub fn sums(&mut self) -> interchange::Result<Vec<f64>> {
+        self.sum(&vec![0.0; self.count], |s, _, _| s)
+    }
+
+    /// Sums over j of w_ij = S_ij^2.
+    pub fn weights(&mut self) -> interchange::Result<Vec<f64>> {
+        self.sum(&vec![0.0; self.count], |s, _, _| s * s)
+    }
+
+    /// (diag(w 1) + w) l.
+    pub fn apply(&mut self, l: &[f64]) -> interchange::Result<Vec<f64>> {
+        self.sum(l, |s, l_i, l_j| s * s * (l_i + l_j))
+    }
+
+    /// Sums over j of `term(S_ij, l_i, l_j)`, which must be symmetric and 0 where S_ij is.
+    fn sum(
+        &mut self,
+        l: &[f64],
+        term: impl Fn(f64, f64, f64) -> f64 + Sync,
+    ) -> interchange::Result<Vec<f64>> {
+        let (mut total, clamped) = (vec![0.0; self.count], &self.clamped);
+        self.writer.for_each_chunk(|views| {
+            let parts: Vec<Vec<f64>> =
+                views.par_iter().map(|view| sums_of(view, &without(view, clamped), l, &term)).collect();
+            views.iter().zip(&parts).for_each(|(view, part)| add(&mut total, view, part));
+        })?;
+        Ok(total)
+    }
+
+    /// Notes the entries that would become negative; whether there are any new ones.
+    pub fn clamp_negative(&mut self, l: &[f64]) -> interchange::Result<bool> {
+        let (mut found, clamped) = (Vec::new(), &self.clamped);
+        self.writer.for_each_chunk(|views| {
+            for view in views {
+                let mut at = view.block.offset;
+                view.for_each(|i, j, s| {
+                    if s * (l[i] + l[j]) < -1.0 && clamped.binary_search(&at).is_err() {
+                        found.push(at);
+                    }
+                    at += 1;
+                });
+            }
+        })?;
+        let any = !found.is_empty();
+        self.clamped.extend(found);
+        self.clamped.sort_unstable();
+        Ok(any)
+    }
+
+    /// Replaces S_ij by S_ij + w_ij (l_i + l_j), or by 0 where that was noted.
+    pub fn replace(&mut self, l: &[f64], precision: Precision) -> interchange::Result<Replaced> {
+        let mut replaced =
+            Replaced { sums: vec![0.0; self.count], changes: vec![0.0; self.count], largest_change: 0.0 };
+        let clamped = &self.clamped;
+        self.writer.replace(|views, bytes| {
+            let replace = |view: &BlockView<'_>| {
+                let mut fresh = Fresh::of(view);
+                let mut at = view.block.offset;
+                view.for_each(|i, j, s| {
+                    // Rounding must not make a negative number of what is nearly 0.
+                    let exact = (s + s * s * (l[i] + l[j])).max(0.0);
+                    let x = if clamped.binary_search(&at).is_ok() { 0.0 } else { exact };
+                    at += 1;
+                    let x = fresh.push(x, precision);
+                    if s > 0.0 {
+                        fresh.largest_change = fresh.largest_change.max((x - s).abs() / s);
+                    }
+                    fresh.sums.add(i, j, x);
+                    fresh.changes.add(i, j, (x - s).abs());
+                });
+                fresh
+            };
+            let parts: Vec<Fresh> = views.par_iter().map(replace).collect();
+            for (view, fresh) in views.iter().zip(&parts) {
+                bytes.extend_from_slice(&fresh.bytes);
+                add(&mut replaced.sums, view, &fresh.sums.values);
+                add(&mut replaced.changes, view, &fresh.changes.values);
+                replaced.largest_change = replaced.largest_change.max(fresh.largest_change);
+            }
+        })?;
+        Ok(replaced)
+    }
+}
+
+/// A block's new entries and what they changed.
+struct Fresh {
+    bytes: Vec<u8>,
+    sums: Ends,
+    changes: Ends,
+    largest_change: f64,
+}
+
+impl Fresh {
+    fn of(view: &BlockView<'_>) -> Self {
+        let bytes = Vec::with_capacity(view.values.bytes().len());
+        Self { bytes, sums: Ends::of(view), changes: Ends::of(view), largest_change: 0.0 }
+    }
+
+    /// Appends an entry and returns it as it is stored.
+    fn push(&mut self, x: f64, precision: Precision) -> f64 {
+        match precision {
+            Precision::F32 => {
+                self.bytes.extend_from_slice(&(x as f32).to_le_bytes());
+                f64::from(x as f32)
+            }
+            Precision::F64 => {
+                self.bytes.extend_from_slice(&x.to_le_bytes());
+                x
+            }
+        }
+    }
+}
+
+/// Places of a block's entries that count as 0, from its first.
+fn without(view: &BlockView<'_>, clamped: &[u64]) -> Vec<usize> {
+    let (first, end) = (view.block.offset, view.block.offset + view.block.stored());
+    let range = clamped.partition_point(|&at| at < first)..clamped.partition_point(|&at| at < end);
+    clamped[range].iter().map(|at| (at - first) as usize).collect()
+}
+
+/// Sums of a block's terms: of its rows, then, off the diagonal, of its columns.
+fn sums_of(
+    view: &BlockView<'_>,
+    without: &[usize],
+    l: &[f64],
+    term: impl Fn(f64, f64, f64) -> f64,
+) -> Vec<f64> {
+    match (view.values, view.block.kind()) {
+        (Values::F32(values), Ok(BlockKind::Dense)) if without.is_empty() => {
+            dense_sums(view, values, l, term)
+        }
+        (Values::F64(values), Ok(BlockKind::Dense)) if without.is_empty() => {
+            dense_sums(view, values, l, term)
+        }
+        _ => {
+            let (mut ends, mut at) = (Ends::of(view), 0);
+            view.for_each(|i, j, s| {
+                if without.binary_search(&at).is_err() {
+                    ends.add(i, j, term(s, l[i], l[j]));
+                }
+                at += 1;
+            });
+            ends.values
+        }
+    }
+}
+
+/// [`sums_of`] for the many: nothing but arithmetic in the inner loop.
+fn dense_sums<T: Copy + Into<f64>>(
+    view: &BlockView<'_>,
+    values: &[T],
+    l: &[f64],
+    term: impl Fn(f64, f64, f64) -> f64,
+) -> Vec<f64> {
+    let (rows, columns) = (view.block.rows as usize, view.block.columns as usize);
+    let l_rows = &l[view.block.row_start as usize..][..rows];
+    let l_columns = &l[view.block.column_start as usize..][..columns];
+    let mut sums = vec![0.0; rows + columns];
+    let (row_sums, column_sums) = sums.split_at_mut(rows);
+    for ((entries, l_i), row_sum) in values.chunks_exact(columns.max(1)).zip(l_rows).zip(row_sums) {
+        for ((s, l_j), column_sum) in entries.iter().zip(l_columns).zip(column_sums.iter_mut()) {
+            let t = term((*s).into(), *l_i, *l_j);
+            *row_sum += t;
+            *column_sum += t;
+        }
+    }
+    sums
+}
+
+/// Sums per row and column of a block; one list where it is a square on the diagonal.
+struct Ends {
+    first_row: usize,
+    first_column: usize,
+    /// Where the columns begin among the values.
+    columns: usize,
+    values: Vec<f64>,
+}
+
+impl Ends {
+    fn of(view: &BlockView<'_>) -> Self {
+        let block = &view.block;
+        let columns = if block.is_diagonal() { 0 } else { block.rows as usize };
+        let values = vec![0.0; columns + block.columns as usize];
+        Self {
+            first_row: block.row_start as usize,
+            first_column: block.column_start as usize,
+            columns,
+            values,
+        }
+    }
+
+    fn add(&mut self, i: usize, j: usize, x: f64) {
+        self.values[i - self.first_row] += x;
+        if i != j {
+            self.values[self.columns + j - self.first_column] += x;
+        }
+    }
+}
+
+/// Adds a block's sums to those of all elements.
+fn add(total: &mut [f64], view: &BlockView<'_>, part: &[f64]) {
+    let block = &view.block;
+    let (rows, columns) = part.split_at(block.rows as usize);
+    total[block.row_start as usize..].iter_mut().zip(rows).for_each(|(sum, x)| *sum += x);
+    total[block.column_start as usize..].iter_mut().zip(columns).for_each(|(sum, x)| *sum += x);
+}
