@@ -3,6 +3,7 @@
 use crate::closure::{self, Closed};
 use crate::estimator::Estimator;
 use crate::exact::Exact;
+use crate::journal::{self, Journal, Run};
 use crate::options::{Shard, Storage};
 use crate::scene::Scene;
 use crate::schedule::in_order;
@@ -10,7 +11,7 @@ use crate::shards;
 use crate::skips::{Skip, Skips};
 use crate::store::{Packing, Store, StoredTile};
 use crate::traversal::{LeafPair, leaf_pairs};
-use interchange::atomic_write::{Partial, refuse_input};
+use interchange::atomic_write::refuse_input;
 use interchange::digest::Digest;
 use interchange::matrix::{BlockKind, MatrixRecord};
 use interchange::mesh::Mesh;
@@ -66,8 +67,28 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
         part: shard.part,
         parts: shard.parts,
     };
-    let partial = Partial::create(&request.output)?;
-    let mut store = Store::create(partial, provenance(&report.flags, digest), record, packing.areas())?;
+    let mut run_flags = report.flags.clone();
+    run_flags.extend(request.no_skip.iter().map(|skip| format!("--no-skip {skip:?}")));
+    let run = Run::new(digest.to_string(), run_flags, &pairs);
+    let begun = journal::begin(&request.output, &run, request.storage.resume)?;
+    begun.notice.iter().for_each(|notice| report.warn(notice.as_str()));
+    let origin = provenance(&report.flags, digest);
+    let mut store = Store::create(begun.work, origin, record, packing.areas())?;
+    store.writer.keep_when_dropped(request.storage.resume);
+    let (mut journal, resumed) = match begun.leftover {
+        None => (Journal::create(&request.output, &run)?, 0),
+        Some(leftover) => {
+            let (journal, tiles, damaged) =
+                report.phase("resume", || store.replay(leftover, &pairs, &run))?;
+            if damaged {
+                report.warn(format!(
+                    "the journal of the killed run is cut short or damaged after {tiles} tiles: the others are computed anew"
+                ));
+            }
+            (journal, tiles)
+        }
+    };
+    journal.keep_when_dropped(request.storage.resume);
     // Parts count what whole clusters settled once.
     if shard.part == 0 {
         store.counts.same_plane += settled.same_plane;
@@ -75,14 +96,19 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
         store.counts.covered += settled.covered;
     }
     let bar = common.progress("form factors", pairs.len());
+    bar.inc(resumed as u64);
     report.phase("pairs", || {
         let work = |k: usize| {
             let tile = packing.pack(&pairs[k], &estimator.tile(&pairs[k]));
             bar.inc(1);
             tile
         };
-        let take = |k: usize, tile: StoredTile| store.add(&pairs[k], &tile);
-        in_order(0..pairs.len(), rayon::current_num_threads(), IN_FLIGHT, |k| bytes(&pairs[k]), work, take)
+        let take = |k: usize, tile: StoredTile| {
+            store.add(&pairs[k], &tile)?;
+            journal.add(k, &tile, &mut store.writer)
+        };
+        let threads = rayon::current_num_threads();
+        in_order(resumed..pairs.len(), threads, IN_FLIGHT, |k| bytes(&pairs[k]), work, take)
     })?;
     bar.finish_and_clear();
 
@@ -95,9 +121,11 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     note_rows(&mut report, &store, closed.as_ref(), tolerance);
     report.count("tests of occluders against shafts of clusters", settled.shaft_tests);
     report.count("tiles", pairs.len());
+    report.count("tiles resumed", resumed);
     report.count("tiles of other shards", all_pairs - pairs.len());
     let finish = finish(tolerance, &store);
     report.phase("write", || store.finish())?;
+    journal.remove();
     report.write_beside(&request.output)?;
     Ok(finish)
 }

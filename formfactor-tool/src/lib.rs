@@ -13,6 +13,7 @@ pub mod estimator;
 pub mod exact;
 pub mod export;
 pub mod info;
+pub mod journal;
 pub mod merge;
 pub mod options;
 pub mod scene;

@@ -23,6 +23,9 @@ pub struct Storage {
     /// Compute part I of N only, balanced by expected work; merge puts the N files together
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
+    /// Go on where a killed run with the same flags was, and keep what is finished when this one fails
+    #[arg(long)]
+    pub resume: bool,
 }
 
 impl Storage {

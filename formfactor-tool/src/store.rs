@@ -2,6 +2,7 @@
 //! to disk at once; what is kept of them is a row error and a row sum per element.
 
 use crate::counts::Counts;
+use crate::journal::{Journal, Leftover, Run};
 use crate::scene::Scene;
 use crate::skips::{Skip, Skips};
 use crate::tile::Tile;
@@ -184,6 +185,31 @@ impl Store {
             self.row_errors[i] += error;
             self.sums[i] += sum;
         }
+    }
+
+    /// Takes over the finished tiles of a killed run: the journal to go on with, their number, whether what came after
+    /// them was damaged.
+    ///
+    /// # Errors
+    /// The files cannot be read or written.
+    pub fn replay(
+        &mut self,
+        leftover: Leftover,
+        pairs: &[LeafPair],
+        run: &Run,
+    ) -> interchange::Result<(Journal, usize, bool)> {
+        let (mut tiles, precision) = (0, self.precision);
+        leftover.replay(pairs, run, precision, |tile, checksum| {
+            if let Some(packed) = &mut tile.packed {
+                if !self.writer.adopt(packed, checksum)? {
+                    return Ok(false);
+                }
+                tile.sums = sums_of(&packed.view());
+            }
+            self.note(&pairs[tiles], tile);
+            tiles += 1;
+            Ok(true)
+        })
     }
 
     /// Sums over j of F_ij.
