@@ -5,19 +5,20 @@ use crate::estimator::Estimator;
 use crate::exact::Exact;
 use crate::journal::{self, Journal, Run};
 use crate::options::{Shard, Storage};
+use crate::plan;
 use crate::scene::Scene;
 use crate::schedule::in_order;
 use crate::shards;
 use crate::skips::{Skip, Skips};
 use crate::store::{Packing, Store, StoredTile};
-use crate::traversal::{LeafPair, leaf_pairs};
+use crate::traversal::leaf_pairs;
 use interchange::atomic_write::refuse_input;
 use interchange::digest::Digest;
 use interchange::matrix::{BlockKind, MatrixRecord};
 use interchange::mesh::Mesh;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
-use interchange::tool::{Common, Finish};
+use interchange::tool::{Common, Finish, print_data};
 use std::path::PathBuf;
 
 /// What `compute` is asked for.
@@ -34,9 +35,6 @@ pub struct Request {
     /// How the matrix is stored.
     pub storage: Storage,
 }
-
-/// Tiles that are computed or wait for their turn take at most this many bytes.
-const IN_FLIGHT: usize = 1 << 28;
 
 /// Computes the matrix of a mesh and writes it with its report.
 pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
@@ -56,6 +54,15 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     let pairs = shards::pairs_of(pairs, &estimator, shard);
 
     let precision = request.storage.precision(tolerance);
+    let threads = rayon::current_num_threads();
+    let memory = plan::memory(&pairs, scene.len(), threads, plan::resident(), request.storage.memory)?;
+    if request.storage.dry_run {
+        print_data(&plan::describe(&scene, &pairs, &settled, &estimator, precision, memory, threads))?;
+        return Ok(Finish::Done);
+    }
+    if request.storage.memory.is_some() && !common.quiet {
+        eprintln!("formfactor-tool: memory: at most {}", plan::size(memory.bound));
+    }
     let packing = Packing::new(&scene, &skips, precision, tolerance);
     let record = MatrixRecord {
         elements: scene.len() as u32,
@@ -107,8 +114,8 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
             store.add(&pairs[k], &tile)?;
             journal.add(k, &tile, &mut store.writer)
         };
-        let threads = rayon::current_num_threads();
-        in_order(resumed..pairs.len(), threads, IN_FLIGHT, |k| bytes(&pairs[k]), work, take)
+        let (budget, cost) = (memory.in_flight as usize, |k: usize| plan::tile_bytes(&pairs[k]) as usize);
+        in_order(resumed..pairs.len(), threads, budget, cost, work, take)
     })?;
     bar.finish_and_clear();
 
@@ -121,6 +128,7 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     note_rows(&mut report, &store, closed.as_ref(), tolerance);
     report.count("tests of occluders against shafts of clusters", settled.shaft_tests);
     report.count("tiles", pairs.len());
+    report.count("memory bound in bytes", memory.bound as usize);
     report.count("tiles resumed", resumed);
     report.count("tiles of other shards", all_pairs - pairs.len());
     let finish = finish(tolerance, &store);
@@ -134,11 +142,6 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
 fn provenance(flags: &[String], mesh: Digest) -> Provenance {
     let origin = Provenance::new("formfactor-tool", env!("CARGO_PKG_VERSION"));
     flags.iter().fold(origin, |origin, flag| origin.flag(flag.as_str())).input("mesh", mesh)
-}
-
-/// Bytes a tile may take: its entries as computed and as stored.
-fn bytes(pair: &LeafPair) -> usize {
-    pair.pairs() * 2 * size_of::<f64>()
 }
 
 fn largest(values: &[f64]) -> f64 {

@@ -4,6 +4,9 @@ use crate::counts::Counts;
 use crate::tile::Tile;
 use crate::traversal::LeafPair;
 
+/// Time of a unit of work, where an estimator does not know better.
+const NANOSECONDS_PER_WORK: f64 = 100.0;
+
 /// Fills rectangles of the matrix. The same pair always gives the same tile, whichever others were asked for before.
 pub trait Estimator: Sync {
     /// Computes the entries of a leaf pair.
@@ -11,6 +14,11 @@ pub trait Estimator: Sync {
 
     /// Expected work of a leaf pair in a unit of its own: for balancing shards and the time left.
     fn work(&self, pair: &LeafPair) -> f64;
+
+    /// Expected time of a leaf pair on one core of a machine of 2024: for what is said before a run, never for a result.
+    fn nanoseconds(&self, pair: &LeafPair) -> f64 {
+        NANOSECONDS_PER_WORK * self.work(pair)
+    }
 }
 
 /// Collects the entries of one tile in the order of the matrix.

@@ -16,6 +16,7 @@ pub mod info;
 pub mod journal;
 pub mod merge;
 pub mod options;
+pub mod plan;
 pub mod scene;
 pub mod schedule;
 pub mod shards;

@@ -1,6 +1,7 @@
 //! Flags of `compute` that say how the matrix is stored, divided and closed.
 
 use crate::closure::Closure;
+use crate::plan::parse_size;
 use clap::{Args, ValueEnum};
 use interchange::matrix::Precision;
 use std::fmt;
@@ -23,6 +24,12 @@ pub struct Storage {
     /// Compute part I of N only, balanced by expected work; merge puts the N files together
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
+    /// Bound on resident memory, such as 8GiB; refused where it cannot be kept
+    #[arg(long, value_name = "SIZE", value_parser = parse_size)]
+    pub memory: Option<u64>,
+    /// Say what the run would take, and write nothing
+    #[arg(long)]
+    pub dry_run: bool,
     /// Go on where a killed run with the same flags was, and keep what is finished when this one fails
     #[arg(long)]
     pub resume: bool,

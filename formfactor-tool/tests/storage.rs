@@ -21,9 +21,13 @@ impl Scene {
     }
 
     fn of(polygons: &[Vec<[f64; 3]>]) -> Self {
+        Self::with_leaves(polygons, 7)
+    }
+
+    fn with_leaves(polygons: &[Vec<[f64; 3]>], leaf: u32) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let mesh = folder.path().join("s.mesh");
-        clustered(polygons, 7).write(&mesh, Provenance::new("test", "1")).unwrap();
+        clustered(polygons, leaf).write(&mesh, Provenance::new("test", "1")).unwrap();
         Self { folder, mesh }
     }
 
@@ -31,15 +35,18 @@ impl Scene {
         self.folder.path().join(name)
     }
 
-    fn compute(&self, name: &str, flags: &[&str]) -> PathBuf {
-        let output = self.path(name);
+    fn run(&self, name: &str, flags: &[&str]) -> assert_cmd::assert::Assert {
         let mut command = tool();
-        command.arg("compute").arg(&self.mesh).arg("-o").arg(&output).args(flags);
+        command.arg("compute").arg(&self.mesh).arg("-o").arg(self.path(name)).args(flags);
         if !flags.contains(&"--tolerance") {
             command.args(["--tolerance", "1e-3"]);
         }
-        command.assert().success();
-        output
+        command.assert()
+    }
+
+    fn compute(&self, name: &str, flags: &[&str]) -> PathBuf {
+        self.run(name, flags).success();
+        self.path(name)
     }
 
     /// What the report beside a file says under this name.
@@ -216,4 +223,50 @@ fn closed_rooms_are_closed_by_default_and_open_ones_are_not() {
     let message = refusal(&mut command);
     assert!(message.contains("found row sum") && message.contains("--closure report"), "{message}");
     assert!(!scene.path("no.ff").exists());
+}
+
+#[test]
+fn a_dry_run_says_what_a_run_takes_and_writes_nothing() {
+    let scene = Scene::room();
+    let before = std::fs::read_dir(scene.folder.path()).unwrap().count();
+    let done = scene.run("s.ff", &["--dry-run"]).success();
+    assert_eq!(std::fs::read_dir(scene.folder.path()).unwrap().count(), before);
+    let plan = String::from_utf8(done.get_output().stdout.clone()).unwrap();
+    let value = |name: &str| -> String {
+        let line = plan.lines().find(|line| line.trim_start().starts_with(name));
+        line.unwrap_or_else(|| panic!("{name}: {plan}")).split_whitespace().last().unwrap().to_owned()
+    };
+    let number = |name: &str| value(name).parse::<usize>().unwrap();
+    assert_eq!((number("elements"), number("pairs")), (48, 48 * 49 / 2));
+    let classes = ["of one plane", "facing away", "fully blocked", "nothing between", "to be looked at"];
+    assert_eq!(classes.map(number).iter().sum::<usize>(), 48 * 49 / 2, "every pair is in one class");
+    assert!(number("to be looked at") > 0);
+    for name in ["time", "file", "memory"] {
+        value(name);
+    }
+    // What is said of tiles is true of the run.
+    scene.compute("s.ff", &[]);
+    assert_eq!(number("tiles") as f64, scene.reported("s.ff", "tiles"));
+}
+
+#[test]
+fn memory_stays_within_what_is_allowed_or_is_refused_with_what_it_takes() {
+    // 58 MB of f64 entries, in 64 MiB with everything else.
+    let scene = Scene::with_leaves(&divided(&inward_cube(0.0, 1.0), 27), 27);
+    let allowed = 64 << 20;
+    let flags = ["--precision", "f64", "--memory", "64MiB", "--threads", "2"];
+    let done = scene.run("s.ff", &flags).success();
+    let said = String::from_utf8(done.get_output().stderr.clone()).unwrap();
+    assert!(said.contains("memory: at most"), "{said}");
+    let file = bytes(&scene.path("s.ff")).len();
+    assert!(file > 50 << 20, "the file has {file} bytes");
+    let report = std::fs::read_to_string(scene.path("s.ff.report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    let peak = report["peak_memory_bytes"].as_u64().unwrap();
+    assert!(peak <= allowed, "{peak} bytes of {allowed}");
+    let done = scene.run("no.ff", &["--memory", "1MiB"]).code(1);
+    let said = String::from_utf8(done.get_output().stderr.clone()).unwrap();
+    assert!(said.contains("1.0 MiB") && said.contains("at least"), "{said}");
+    assert!(!scene.path("no.ff").exists());
+    scene.run("no.ff", &["--memory", "much"]).code(2);
 }

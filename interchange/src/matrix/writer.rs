@@ -12,9 +12,9 @@ use tempfile::SpooledTempFile;
 /// Sections in the order in which they are written: what is known only at the end comes last.
 const SECTIONS: [&str; 5] = ["areas", "values", "blocks", "row_errors", "sparse"];
 /// Columns of sparse blocks beyond this many bytes wait for the end in a file without a name.
-const SPOOL: usize = 1 << 24;
+const SPOOL: usize = 1 << 22;
 /// Entries are read back in chunks of about this many bytes.
-const CHUNK: usize = 1 << 23;
+const CHUNK: usize = 1 << 22;
 
 /// A matrix being written.
 #[derive(Debug)]
