@@ -153,11 +153,14 @@ pub fn begin(output: &Path, run: &Run, resume: bool) -> anyhow::Result<Begun> {
     Ok(Begun { work: Partial::create_named(output, WORK)?, leftover: None, notice })
 }
 
-/// Whether a process of this program with this number is there, other than this one; as far as Linux tells.
+/// Whether a process of this program with this number is at work, other than this one; as far as Linux tells. One that was
+/// killed and that its parent has not taken leave of yet has a name still, but no command line.
 fn is_running(process: u32) -> bool {
-    let program = |process: u32| std::fs::read_to_string(format!("/proc/{process}/comm")).ok();
+    let told = |process: u32, file: &str| std::fs::read(format!("/proc/{process}/{file}")).ok();
     let own = std::process::id();
-    process != own && program(process).is_some() && program(process) == program(own)
+    process != own
+        && told(process, "comm").is_some_and(|name| told(own, "comm") == Some(name))
+        && told(process, "cmdline").is_some_and(|line| !line.is_empty())
 }
 
 impl Leftover {

@@ -6,7 +6,7 @@ mod common;
 use common::{clustered, divided, room_with_box};
 use interchange::provenance::Provenance;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 /// A room that takes some seconds, in a folder of its own.
@@ -37,7 +37,7 @@ fn length(path: &Path) -> u64 {
 }
 
 /// Starts a run and kills it once some tiles are in its journal.
-fn kill_half_way(mesh: &Path, output: &Path) {
+fn kill_half_way(mesh: &Path, output: &Path) -> Child {
     let mut child = command(mesh, output, &[]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let deadline = Instant::now() + Duration::from_secs(300);
     while length(&hidden(output, "journal")) < 3000 {
@@ -50,8 +50,10 @@ fn kill_half_way(mesh: &Path, output: &Path) {
     assert_eq!(second.status.code(), Some(1));
     assert!(text(&second).contains("wait for it"), "{}", text(&second));
     child.kill().unwrap();
-    child.wait().unwrap();
+    // Until its parent asks for it, a killed process keeps its number; it must not be taken for one at work.
+    std::thread::sleep(Duration::from_millis(200));
     assert!(!output.exists());
+    child
 }
 
 fn text(output: &Output) -> String {
@@ -71,7 +73,7 @@ fn a_killed_run_is_gone_on_with_and_damage_is_not_trusted() {
     assert!(run(&mesh, &whole, &[]).status.success());
     let want = std::fs::read(&whole).unwrap();
     let output = folder.path().join("s.ff");
-    kill_half_way(&mesh, &output);
+    let mut killed = kill_half_way(&mesh, &output);
     let (work, journal) = (hidden(&output, "work"), hidden(&output, "journal"));
     let left = (std::fs::read(&work).unwrap(), std::fs::read(&journal).unwrap());
 
@@ -81,6 +83,7 @@ fn a_killed_run_is_gone_on_with_and_damage_is_not_trusted() {
     assert!(std::fs::read(&output).unwrap() == want);
     let tiles = resumed(&output);
     assert!(tiles > 0);
+    killed.wait().unwrap();
     assert!(!work.exists() && !journal.exists(), "what is no longer needed is removed");
 
     // A record, some entries, the first line damaged; the journal cut; another flag; no --resume.

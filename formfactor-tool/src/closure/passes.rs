@@ -181,6 +181,9 @@ fn sums_of(
     }
 }
 
+/// Partial sums of a row side by side.
+const LANES: usize = 4;
+
 /// [`sums_of`] for the many: nothing but arithmetic in the inner loop.
 fn dense_sums<T: Copy + Into<f64>>(
     view: &BlockView<'_>,
@@ -193,12 +196,24 @@ fn dense_sums<T: Copy + Into<f64>>(
     let l_columns = &l[view.block.column_start as usize..][..columns];
     let mut sums = vec![0.0; rows + columns];
     let (row_sums, column_sums) = sums.split_at_mut(rows);
+    let (l_whole, l_rest) = l_columns.as_chunks::<LANES>();
+    let (column_whole, column_rest) = column_sums.as_chunks_mut::<LANES>();
     for ((entries, l_i), row_sum) in values.chunks_exact(columns.max(1)).zip(l_rows).zip(row_sums) {
-        for ((s, l_j), column_sum) in entries.iter().zip(l_columns).zip(column_sums.iter_mut()) {
+        let (whole, rest) = entries.as_chunks::<LANES>();
+        let mut lanes = [0.0; LANES];
+        for ((s, l_j), column_sums) in whole.iter().zip(l_whole).zip(column_whole.iter_mut()) {
+            for lane in 0..LANES {
+                let t = term(s[lane].into(), *l_i, l_j[lane]);
+                lanes[lane] += t;
+                column_sums[lane] += t;
+            }
+        }
+        for ((s, l_j), column_sum) in rest.iter().zip(l_rest).zip(column_rest.iter_mut()) {
             let t = term((*s).into(), *l_i, *l_j);
-            *row_sum += t;
+            lanes[0] += t;
             *column_sum += t;
         }
+        *row_sum = (lanes[0] + lanes[2]) + (lanes[1] + lanes[3]);
     }
     sums
 }
