@@ -48,7 +48,8 @@ impl Packing {
         Self {
             precision,
             rounding: if precision == Precision::F32 { F32_ROUNDING } else { 0.0 },
-            quantum: power_of_two_below(tolerance) * ERROR_QUANTUM,
+            // The smallest tolerances a user can write leave no number below them.
+            quantum: (power_of_two_below(tolerance) * ERROR_QUANTUM).max(f64::MIN_POSITIVE),
             keep_zeros: !skips.has(Skip::ZeroBlocks),
             areas: scene.patches.iter().map(|p| p.area).collect(),
         }
@@ -223,5 +224,43 @@ impl Store {
     /// The file cannot be written.
     pub fn finish(self) -> interchange::Result<Outcome> {
         self.writer.finish(&self.row_errors)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn packing(tolerance: f64) -> Packing {
+        let scene = Scene {
+            patches: Vec::new(),
+            faces: Vec::new(),
+            sides: Vec::new(),
+            occluders: Vec::new(),
+            clusters: Vec::new(),
+            convex: true,
+        };
+        Packing::new(&scene, &Skips::default(), Precision::F64, tolerance)
+    }
+
+    /// Errors are never rounded down, by next to nothing up, and add up to the same bits in any order.
+    #[test]
+    fn rounded_errors_add_up_exactly() {
+        for tolerance in [0.5, 1e-4, 3e-7, 1e-12, 1e-290] {
+            let packing = packing(tolerance);
+            let errors: Vec<f64> = (1..2000u32)
+                .map(|k| tolerance * f64::from(k.wrapping_mul(2_654_435_761) >> 8) / f64::from(1 << 24))
+                .collect();
+            let rounded: Vec<f64> = errors.iter().map(|&error| packing.round_up(error)).collect();
+            for (error, rounded) in errors.iter().zip(&rounded) {
+                assert!(rounded >= error && rounded - error <= 3e-10 * tolerance, "{error:e} {rounded:e}");
+            }
+            let forwards: f64 = rounded.iter().sum();
+            let backwards: f64 = rounded.iter().rev().sum();
+            let halves =
+                rounded.iter().step_by(2).sum::<f64>() + rounded.iter().skip(1).step_by(2).sum::<f64>();
+            assert!(forwards == backwards && forwards == halves, "{forwards:e} {backwards:e} {halves:e}");
+        }
+        assert!(packing(f64::from_bits(1)).round_up(1e-3).is_finite());
     }
 }
