@@ -6,6 +6,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod block_sums;
 pub mod closure;
 pub mod compute;
 pub mod counts;

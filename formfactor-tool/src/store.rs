@@ -1,6 +1,7 @@
 //! From computed tiles to a matrix file, tile after tile in order: entries are narrowed to their stored precision and go
 //! to disk at once; what is kept of them is a row error and a row sum per element.
 
+use crate::block_sums::{self, sums_of};
 use crate::counts::Counts;
 use crate::journal::{Journal, Leftover, Run};
 use crate::scene::Scene;
@@ -92,22 +93,6 @@ fn power_of_two_below(x: f64) -> f64 {
     f64::from_bits(x.to_bits() & f64::INFINITY.to_bits())
 }
 
-/// Sums of a block's entries: of its rows over its columns, then, off the diagonal, of its columns over its rows.
-pub fn sums_of(view: &BlockView<'_>) -> Vec<f64> {
-    let block = &view.block;
-    let (rows, first_row) = (block.rows as usize, block.row_start as usize);
-    let diagonal = block.is_diagonal();
-    let place = |j: usize| if diagonal { j - first_row } else { rows + j - block.column_start as usize };
-    let mut sums = vec![0.0; rows + if diagonal { 0 } else { block.columns as usize }];
-    view.for_each(|i, j, s| {
-        sums[i - first_row] += s;
-        if i != j {
-            sums[place(j)] += s;
-        }
-    });
-    sums
-}
-
 /// A matrix on its way to disk.
 #[derive(Debug)]
 pub struct Store {
@@ -168,12 +153,7 @@ impl Store {
     /// The file cannot be written.
     pub fn copy(&mut self, view: &BlockView<'_>) -> interchange::Result<()> {
         self.writer.push(&PackedBlock::copy_of(view))?;
-        let block = &view.block;
-        let elements = |start: u32, count: u32| start as usize..(start + count) as usize;
-        let rows = elements(block.row_start, block.rows);
-        rows.chain(elements(block.column_start, block.columns))
-            .zip(sums_of(view))
-            .for_each(|(i, sum)| self.sums[i] += sum);
+        block_sums::add(&mut self.sums, view, &sums_of(view));
         Ok(())
     }
 

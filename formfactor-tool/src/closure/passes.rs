@@ -1,7 +1,8 @@
 //! What closure asks of the blocks on disk: sums over all entries, some blocks in memory at a time, on all cores. The
 //! order of every sum follows the file alone.
 
-use interchange::matrix::{BlockKind, BlockView, MatrixWriter, Precision, Values};
+use crate::block_sums::{Ends, add, terms_of};
+use interchange::matrix::{BlockView, MatrixWriter, Precision};
 use rayon::prelude::*;
 
 /// Sums over the entries of a matrix that is being written.
@@ -57,7 +58,7 @@ impl<'a> Passes<'a> {
         let (mut total, clamped) = (vec![0.0; self.count], &self.clamped);
         self.writer.for_each_chunk(|views| {
             let parts: Vec<Vec<f64>> =
-                views.par_iter().map(|view| sums_of(view, &without(view, clamped), l, &term)).collect();
+                views.par_iter().map(|view| terms_of(view, &without(view, clamped), l, &term)).collect();
             views.iter().zip(&parts).for_each(|(view, part)| add(&mut total, view, part));
         })?;
         Ok(total)
@@ -152,106 +153,4 @@ fn without(view: &BlockView<'_>, clamped: &[u64]) -> Vec<usize> {
     let (first, end) = (view.block.offset, view.block.offset + view.block.stored());
     let range = clamped.partition_point(|&at| at < first)..clamped.partition_point(|&at| at < end);
     clamped[range].iter().map(|at| (at - first) as usize).collect()
-}
-
-/// Sums of a block's terms: of its rows, then, off the diagonal, of its columns.
-fn sums_of(
-    view: &BlockView<'_>,
-    without: &[usize],
-    l: &[f64],
-    term: impl Fn(f64, f64, f64) -> f64,
-) -> Vec<f64> {
-    match (view.values, view.block.kind()) {
-        (Values::F32(values), Ok(BlockKind::Dense)) if without.is_empty() => {
-            dense_sums(view, values, l, term)
-        }
-        (Values::F64(values), Ok(BlockKind::Dense)) if without.is_empty() => {
-            dense_sums(view, values, l, term)
-        }
-        _ => {
-            let (mut ends, mut at) = (Ends::of(view), 0);
-            view.for_each(|i, j, s| {
-                if without.binary_search(&at).is_err() {
-                    ends.add(i, j, term(s, l[i], l[j]));
-                }
-                at += 1;
-            });
-            ends.values
-        }
-    }
-}
-
-/// Partial sums of a row side by side.
-const LANES: usize = 4;
-
-/// [`sums_of`] for the many: nothing but arithmetic in the inner loop.
-fn dense_sums<T: Copy + Into<f64>>(
-    view: &BlockView<'_>,
-    values: &[T],
-    l: &[f64],
-    term: impl Fn(f64, f64, f64) -> f64,
-) -> Vec<f64> {
-    let (rows, columns) = (view.block.rows as usize, view.block.columns as usize);
-    let l_rows = &l[view.block.row_start as usize..][..rows];
-    let l_columns = &l[view.block.column_start as usize..][..columns];
-    let mut sums = vec![0.0; rows + columns];
-    let (row_sums, column_sums) = sums.split_at_mut(rows);
-    let (l_whole, l_rest) = l_columns.as_chunks::<LANES>();
-    let (column_whole, column_rest) = column_sums.as_chunks_mut::<LANES>();
-    for ((entries, l_i), row_sum) in values.chunks_exact(columns.max(1)).zip(l_rows).zip(row_sums) {
-        let (whole, rest) = entries.as_chunks::<LANES>();
-        let mut lanes = [0.0; LANES];
-        for ((s, l_j), column_sums) in whole.iter().zip(l_whole).zip(column_whole.iter_mut()) {
-            for lane in 0..LANES {
-                let t = term(s[lane].into(), *l_i, l_j[lane]);
-                lanes[lane] += t;
-                column_sums[lane] += t;
-            }
-        }
-        for ((s, l_j), column_sum) in rest.iter().zip(l_rest).zip(column_rest.iter_mut()) {
-            let t = term((*s).into(), *l_i, *l_j);
-            lanes[0] += t;
-            *column_sum += t;
-        }
-        *row_sum = (lanes[0] + lanes[2]) + (lanes[1] + lanes[3]);
-    }
-    sums
-}
-
-/// Sums per row and column of a block; one list where it is a square on the diagonal.
-struct Ends {
-    first_row: usize,
-    first_column: usize,
-    /// Where the columns begin among the values.
-    columns: usize,
-    values: Vec<f64>,
-}
-
-impl Ends {
-    fn of(view: &BlockView<'_>) -> Self {
-        let block = &view.block;
-        let columns = if block.is_diagonal() { 0 } else { block.rows as usize };
-        let values = vec![0.0; columns + block.columns as usize];
-        Self {
-            first_row: block.row_start as usize,
-            first_column: block.column_start as usize,
-            columns,
-            values,
-        }
-    }
-
-    fn add(&mut self, i: usize, j: usize, x: f64) {
-        self.values[i - self.first_row] += x;
-        if i != j {
-            self.values[self.columns + j - self.first_column] += x;
-        }
-    }
-}
-
-/// Adds a block's sums to those of all elements.
-fn add(total: &mut [f64], view: &BlockView<'_>, part: &[f64]) {
-    let block = &view.block;
-    let (rows, columns) = part.split_at(block.rows as usize);
-    total[block.row_start as usize..].iter_mut().zip(rows).for_each(|(sum, x)| *sum += x);
-    total[block.column_start as usize..].iter_mut().zip(columns).for_each(|(sum, x)| *sum += x);
 }

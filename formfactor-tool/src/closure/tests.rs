@@ -2,8 +2,9 @@
 #![allow(clippy::unwrap_used)]
 
 use super::*;
+use crate::block_sums::sums_of;
 use crate::counts::Counts;
-use crate::store::{StoredTile, sums_of};
+use crate::store::StoredTile;
 use crate::traversal::LeafPair;
 use geometry::pair::{self, Accuracy};
 use geometry::patch::Patch;
