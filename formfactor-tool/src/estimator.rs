@@ -6,8 +6,9 @@ use crate::traversal::LeafPair;
 
 /// Time of a unit of work of pairs that nothing can block: a cube of 9600 squares at 1e-4 on a core of an EPYC of 2024.
 const NANOSECONDS_UNOCCLUDED: f64 = 180.0;
-/// Time of a unit of work of pairs that have to be looked at: a cube with eight boxes, 576 squares, there.
-const NANOSECONDS_UNDECIDED: f64 = 4000.0;
+/// Time of a unit of work of pairs that have to be looked at: between 4000 and 2500 for a cube with eight boxes in 576 and
+/// 2304 squares there.
+const NANOSECONDS_UNDECIDED: f64 = 3000.0;
 
 /// Fills rectangles of the matrix. The same pair always gives the same tile, whichever others were asked for before.
 pub trait Estimator: Sync {
