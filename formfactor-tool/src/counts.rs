@@ -3,9 +3,10 @@
 use geometry::occluded::Effort;
 use geometry::unoccluded::Rule;
 use interchange::report::Report;
+use serde::{Deserialize, Serialize};
 
 /// Pairs of elements by class.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
     /// Of one plane.
     pub same_plane: usize,

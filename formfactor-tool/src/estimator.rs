@@ -5,6 +5,12 @@ use crate::tile::Tile;
 use crate::traversal::LeafPair;
 use interchange::report::Report;
 
+/// Time of a unit of work of pairs that nothing can block: a cube of 9600 squares at 1e-4 on a core of an EPYC of 2024.
+const NANOSECONDS_UNOCCLUDED: f64 = 180.0;
+/// Time of a unit of work of pairs that have to be looked at: between 4000 and 2500 for a cube with eight boxes in 576 and
+/// 2304 squares there.
+const NANOSECONDS_UNDECIDED: f64 = 3000.0;
+
 /// Fills rectangles of the matrix. The same pair always gives the same tile, whichever others were asked for before.
 pub trait Estimator: Sync {
     /// Computes the entries of a leaf pair.
@@ -15,6 +21,14 @@ pub trait Estimator: Sync {
 
     /// Counters and estimates of its own, after all tiles.
     fn note(&self, _report: &mut Report) {}
+
+    /// Expected time of a leaf pair on one core: for what is said before a run, never for a result.
+    fn nanoseconds(&self, pair: &LeafPair) -> f64 {
+        match pair.blockers.is_empty() {
+            true => NANOSECONDS_UNOCCLUDED * self.work(pair),
+            false => NANOSECONDS_UNDECIDED * self.work(pair),
+        }
+    }
 }
 
 /// Collects the entries of one tile in the order of the matrix.

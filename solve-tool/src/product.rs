@@ -6,7 +6,7 @@
 //! tasks.
 
 use crate::kernel::{self, Entry, ROWS, Rows};
-use interchange::matrix::{Block, BlockKind, Matrix, Values};
+use interchange::matrix::{Block, BlockKind, BlockView, Matrix, Values, views};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -21,8 +21,7 @@ const REDUCTION_ROWS: usize = 1024;
 #[derive(Debug)]
 pub struct Product<'a> {
     elements: usize,
-    blocks: &'a [Block],
-    values: Values<'a>,
+    views: Vec<BlockView<'a>>,
     tasks: Vec<Task>,
 }
 
@@ -45,15 +44,20 @@ struct Piece {
 impl<'a> Product<'a> {
     /// The product with a mapped matrix.
     pub fn new(matrix: &'a Matrix) -> interchange::Result<Self> {
-        Ok(Self::from_parts(matrix.element_count(), matrix.blocks()?, matrix.values()?))
+        Ok(Self::from_views(matrix.element_count(), matrix.views()?))
     }
 
-    /// The product with blocks in memory; they must lie within `elements` rows, and `values` must hold their entries.
+    /// The product with full blocks in memory; they must lie within `elements` rows, and `values` must hold their entries.
     pub fn from_parts(elements: usize, blocks: &'a [Block], values: Values<'a>) -> Self {
-        let stored: u64 = blocks.iter().map(Block::stored).sum();
-        debug_assert_eq!(stored, values.len() as u64, "blocks and values disagree");
+        Self::from_views(elements, views(blocks, values, &[]).collect())
+    }
+
+    /// The product with blocks that lie within `elements` rows.
+    pub fn from_views(elements: usize, views: Vec<BlockView<'a>>) -> Self {
+        let stored: u64 = views.iter().map(|view| view.block.stored()).sum();
         let quota = MIN_TASK_ENTRIES.max(stored.div_ceil(MAX_TASKS));
-        Self { elements, blocks, values, tasks: partition(blocks, quota) }
+        let tasks = partition(&views, quota);
+        Self { elements, views, tasks }
     }
 
     /// Number of rows.
@@ -63,22 +67,14 @@ impl<'a> Product<'a> {
 
     /// Number of stored entries; each pair once.
     pub fn stored_entries(&self) -> usize {
-        self.values.len()
+        self.views.iter().map(|view| view.values.len()).sum()
     }
 
     /// Calls `visit(i, j, S_ij)` for every stored entry, each pair once with i <= j, until it says to stop.
     pub fn for_each_until(&self, mut visit: impl FnMut(usize, usize, f64) -> std::ops::ControlFlow<()>) {
-        for block in self.blocks {
-            let mut at = block.offset as usize;
-            for row in 0..block.rows as usize {
-                let first = if block.kind() == Ok(BlockKind::Triangle) { row } else { 0 };
-                for column in first..block.columns as usize {
-                    let (i, j) = (block.row_start as usize + row, block.column_start as usize + column);
-                    if visit(i, j, self.values.get(at)).is_break() {
-                        return;
-                    }
-                    at += 1;
-                }
+        for view in &self.views {
+            if view.try_for_each(&mut visit).is_break() {
+                return;
             }
         }
     }
@@ -97,16 +93,8 @@ impl<'a> Product<'a> {
     }
 
     fn apply_some<const K: usize>(&self, x: [&[f64]; K]) -> [Vec<f64>; K] {
-        match self.values {
-            Values::F32(values) => self.apply_entries(values, x),
-            Values::F64(values) => self.apply_entries(values, x),
-        }
-    }
-
-    fn apply_entries<const K: usize, T: Entry>(&self, values: &[T], x: [&[f64]; K]) -> [Vec<f64>; K] {
         debug_assert!(x.iter().all(|x| x.len() == self.elements), "vectors of another length");
-        let partial: Vec<[Vec<f64>; K]> =
-            self.tasks.par_iter().map(|task| self.run(task, values, x)).collect();
+        let partial: Vec<[Vec<f64>; K]> = self.tasks.par_iter().map(|task| self.run(task, x)).collect();
         std::array::from_fn(|k| {
             let mut y = vec![0.0; self.elements];
             y.par_chunks_mut(REDUCTION_ROWS).enumerate().for_each(|(chunk, y)| {
@@ -122,39 +110,63 @@ impl<'a> Product<'a> {
         })
     }
 
-    fn run<const K: usize, T: Entry>(&self, task: &Task, values: &[T], x: [&[f64]; K]) -> [Vec<f64>; K] {
+    fn run<const K: usize>(&self, task: &Task, x: [&[f64]; K]) -> [Vec<f64>; K] {
         let mut y = std::array::from_fn(|_| vec![0.0; task.span.len()]);
         for piece in &task.pieces {
-            let block = &self.blocks[piece.block as usize];
-            let rows = Rows {
-                first: piece.first as usize,
-                count: (piece.end - piece.first) as usize,
-                row_start: block.row_start as usize,
-                column_start: block.column_start as usize,
-                columns: block.columns as usize,
-                triangle: block.kind() == Ok(BlockKind::Triangle),
-                offset: block.offset as usize,
-            };
-            kernel::add_rows(&rows, values, x, &mut y, task.span.start);
+            let view = &self.views[piece.block as usize];
+            match view.values {
+                Values::F32(values) => run_piece(piece, view, values, x, &mut y, task.span.start),
+                Values::F64(values) => run_piece(piece, view, values, x, &mut y, task.span.start),
+            }
         }
         y
     }
 }
 
+fn run_piece<const K: usize, T: Entry>(
+    piece: &Piece,
+    view: &BlockView<'_>,
+    values: &[T],
+    x: [&[f64]; K],
+    y: &mut [Vec<f64>; K],
+    base: usize,
+) {
+    let block = &view.block;
+    if block.kind() == Ok(BlockKind::Sparse) {
+        kernel::add_sparse_rows(view, piece.first as usize..piece.end as usize, values, x, y, base);
+        return;
+    }
+    let rows = Rows {
+        first: piece.first as usize,
+        count: (piece.end - piece.first) as usize,
+        row_start: block.row_start as usize,
+        column_start: block.column_start as usize,
+        columns: block.columns as usize,
+        triangle: block.kind() == Ok(BlockKind::Triangle),
+        offset: 0,
+    };
+    kernel::add_rows(&rows, values, x, y, base);
+}
+
 /// Cuts the blocks into tasks of about `quota` entries, at multiples of the kernel's rows.
-fn partition(blocks: &[Block], quota: u64) -> Vec<Task> {
+fn partition(views: &[BlockView<'_>], quota: u64) -> Vec<Task> {
     let mut tasks = Vec::new();
     let mut task = Task::default();
     let mut filled = 0;
-    for (index, block) in blocks.iter().enumerate() {
-        let triangle = block.kind() == Ok(BlockKind::Triangle);
+    for (index, view) in views.iter().enumerate() {
+        let block = &view.block;
+        let kind = block.kind();
         let mut first = 0;
         while first < block.rows {
             // Take rows until the quota is met.
             let mut end = first;
             while end < block.rows && filled < quota {
                 let next = (end + ROWS as u32).min(block.rows);
-                let entries = |row: u32| u64::from(block.columns - if triangle { row } else { 0 });
+                let entries = |row: u32| match kind {
+                    Ok(BlockKind::Sparse) => view.row_entries(row as usize).len() as u64,
+                    Ok(BlockKind::Triangle) => u64::from(block.columns - row),
+                    _ => u64::from(block.columns),
+                };
                 filled += (end..next).map(entries).sum::<u64>();
                 end = next;
             }

@@ -26,8 +26,8 @@ const MOST_NAMES: usize = 8;
 /// What `solve` is asked to do.
 #[derive(Debug, Clone)]
 pub struct SolveRequest {
-    /// The exchange matrix.
-    pub matrix: PathBuf,
+    /// The exchange matrix, or all its shards.
+    pub matrix: Vec<PathBuf>,
     /// The mesh it was computed for.
     pub mesh: PathBuf,
     /// Materials in place of the table beside the mesh.
@@ -42,11 +42,11 @@ pub struct SolveRequest {
 
 /// Solves and writes the solution and its report. Nothing is written where there is no solution.
 pub fn run(request: &SolveRequest) -> Result<Finish> {
-    let given = [Some(&request.matrix), Some(&request.mesh), request.materials.as_ref()];
-    refuse_input(&request.output, given.into_iter().flatten().map(PathBuf::as_path))?;
+    let given = request.matrix.iter().chain([&request.mesh]).chain(&request.materials);
+    refuse_input(&request.output, given.map(PathBuf::as_path))?;
     let mut report = Report::new(TOOL, VERSION);
     let (mesh, _, mesh_digest) = report.phase("read mesh", || Mesh::read(&request.mesh))?;
-    let matrix = report.phase("map matrix", || Matrix::open(&request.matrix))?;
+    let matrix = report.phase("map matrix", || Matrix::open_all(&request.matrix))?;
     matrix.belongs_to(&request.mesh, mesh_digest, mesh.element_count())?;
     refuse_unsupported(&matrix)?;
     let (materials, materials_digest) =
@@ -80,20 +80,13 @@ pub fn run(request: &SolveRequest) -> Result<Finish> {
     Ok(missed.map_or(Finish::Done, Finish::ToleranceMissed))
 }
 
-/// Refuses parts of a matrix and matrices that are not symmetric: this solver needs the whole, symmetric S.
+/// Refuses matrices that are not symmetric: this solver needs symmetric S.
 fn refuse_unsupported(matrix: &Matrix) -> Result<()> {
-    let record = matrix.record();
-    let (found, remedy) = if record.parts != 1 {
-        let found = format!("part {} of {} of a matrix", record.part + 1, record.parts);
-        (found, "run formfactor-tool compute without --shard")
-    } else if !record.symmetric {
-        (
-            "a matrix without its mirror image (not symmetric)".into(),
-            "run formfactor-tool compute on the mesh",
-        )
-    } else {
+    if matrix.record().symmetric {
         return Ok(());
-    };
+    }
+    let found = "a matrix without its mirror image (not symmetric)".into();
+    let remedy = "run formfactor-tool compute on the mesh";
     Err(SolveError::Unsupported { path: matrix.path().display().to_string(), found, remedy })
 }
 
