@@ -1,8 +1,7 @@
 //! `compute`: a mesh file in, a matrix file out.
 
 use crate::counts::Counts;
-use crate::estimator::Estimator;
-use crate::exact::Exact;
+use crate::method::Choice;
 use crate::scene::Scene;
 use crate::skips::{Skip, Skips};
 use crate::store::{self, Assembled};
@@ -24,6 +23,8 @@ pub struct Request {
     pub output: PathBuf,
     /// Bound on the estimated sum over j of |error of F_ij| in any row.
     pub tolerance: f64,
+    /// How the entries are computed.
+    pub method: Choice,
     /// Skips turned off.
     pub no_skip: Vec<Skip>,
 }
@@ -35,11 +36,12 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     let skips = Skips::without(&request.no_skip);
     let mut report = Report::new("formfactor-tool", env!("CARGO_PKG_VERSION"));
     report.flags.push(format!("--tolerance {tolerance}"));
+    report.flags.extend(request.method.flags());
     let (mesh, _, digest) = report.phase("read", || Mesh::read(&request.mesh))?;
     let scene = report.phase("prepare", || Scene::new(&mesh, &skips))?;
     let (pairs, settled) = report.phase("traverse", || leaf_pairs(&scene, &skips));
 
-    let estimator = Exact::new(&scene, tolerance);
+    let estimator = request.method.estimator(&scene, tolerance);
     let bar = common.progress("form factors", pairs.len());
     let tiles: Vec<Tile> = report.phase("pairs", || {
         let compute = |pair| {
@@ -61,7 +63,9 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     let matrix = report.phase("assemble", || store::assemble(&scene, &pairs, &tiles, tolerance));
     note(&mut report, &mesh, &scene, &matrix, &counts, tolerance);
     report.count("tests of occluders against shafts of clusters", settled.shaft_tests);
-    report.phase("write", || store::write(&request.output, digest, &matrix, tolerance))?;
+    estimator.note(&mut report);
+    let flags = report.flags.clone();
+    report.phase("write", || store::write(&request.output, digest, &matrix, tolerance, &flags))?;
     report.write_beside(&request.output)?;
     Ok(finish(tolerance, &matrix))
 }

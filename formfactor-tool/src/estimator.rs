@@ -3,6 +3,7 @@
 use crate::counts::Counts;
 use crate::tile::Tile;
 use crate::traversal::LeafPair;
+use interchange::report::Report;
 
 /// Fills rectangles of the matrix. The same pair always gives the same tile, whichever others were asked for before.
 pub trait Estimator: Sync {
@@ -11,6 +12,9 @@ pub trait Estimator: Sync {
 
     /// Expected work of a leaf pair in a unit of its own: for balancing shards and the time left.
     fn work(&self, pair: &LeafPair) -> f64;
+
+    /// Adds to the report what only this method has to tell.
+    fn note(&self, _report: &mut Report) {}
 }
 
 /// Collects the entries of one tile in the order of the matrix.

@@ -5,14 +5,22 @@
 
 #![forbid(unsafe_code)]
 
+pub mod area_form;
+pub mod classical;
+pub mod compare;
 pub mod compute;
 pub mod counts;
 pub mod estimator;
 pub mod exact;
 pub mod export;
+pub mod hemicube;
 pub mod info;
+pub mod method;
+pub mod rays;
+pub mod rows;
 pub mod scene;
 pub mod skips;
 pub mod store;
 pub mod tile;
 pub mod traversal;
+pub mod visible_share;

@@ -68,14 +68,19 @@ pub fn assemble(scene: &Scene, pairs: &[LeafPair], tiles: &[Tile], tolerance: f6
     Assembled { blocks, values, areas, row_errors, row_sums, precision, absent_blocks }
 }
 
-/// Writes the matrix.
+/// Writes the matrix; `flags` are those that change the result.
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write(path: &Path, mesh: Digest, matrix: &Assembled, tolerance: f64) -> interchange::Result<()> {
-    let provenance = Provenance::new("formfactor-tool", env!("CARGO_PKG_VERSION"))
-        .flag(format!("--tolerance {tolerance}"))
-        .input("mesh", mesh);
+pub fn write(
+    path: &Path,
+    mesh: Digest,
+    matrix: &Assembled,
+    tolerance: f64,
+    flags: &[String],
+) -> interchange::Result<()> {
+    let origin = Provenance::new("formfactor-tool", env!("CARGO_PKG_VERSION")).input("mesh", mesh);
+    let provenance = flags.iter().fold(origin, Provenance::flag);
     let record = MatrixRecord {
         elements: matrix.areas.len() as u32,
         mesh,

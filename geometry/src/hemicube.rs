@@ -238,18 +238,20 @@ impl Buffer {
         for (row, &(left, right)) in (first_row..last_row).zip(&self.spans) {
             let (start, end) = (self.column(left), self.column(right));
             let constant = normal.y * row_centres[row] + normal.z;
-            for column in start..end {
-                let nearness = normal.x * columns[column] + constant;
-                let cell = row * self.width + column;
-                let (held, holder) = (self.nearness[cell], self.numbers[cell]);
-                let in_front = if holder == BLOCKED && polygon.number != BLOCKED {
-                    nearness > held * (1.0 - SAME_DEPTH)
+            if start >= end {
+                continue;
+            }
+            let cells = row * self.width + start..row * self.width + end;
+            let held = self.nearness[cells.clone()].iter_mut().zip(&mut self.numbers[cells]);
+            for (&x, (held, holder)) in columns[start..end].iter().zip(held) {
+                let nearness = normal.x * x + constant;
+                let least = if *holder == BLOCKED && polygon.number != BLOCKED {
+                    *held * (1.0 - SAME_DEPTH)
                 } else {
-                    nearness > held
+                    *held
                 };
-                if in_front {
-                    self.nearness[cell] = nearness;
-                    self.numbers[cell] = polygon.number;
+                if nearness > least {
+                    (*held, *holder) = (nearness, polygon.number);
                 }
             }
         }
@@ -264,14 +266,22 @@ impl Buffer {
     /// Cuts the corners at the four planes of the face's pyramid; whether anything is left. All that is left has a
     /// depth above 0: its plane does not hold the eye.
     fn clip_to_pyramid(&mut self) -> bool {
-        let planes: [fn(DVec3) -> f64; 4] = [|p| p.z - p.x, |p| p.z + p.x, |p| p.z - p.y, |p| p.z + p.y];
-        for plane in planes {
-            if self.corners.iter().all(|&c| plane(c) <= 0.0) {
-                return false;
-            }
+        // One bit per plane: what no corner is inside of cuts all away, what all are inside of cuts nothing.
+        let (mut outside_all, mut outside_any) = (0b1111u8, 0u8);
+        for &c in &self.corners {
+            let codes = [c.z - c.x, c.z + c.x, c.z - c.y, c.z + c.y];
+            let bits = |is_out: fn(f64) -> bool| {
+                codes.iter().enumerate().fold(0, |bits, (k, &h)| bits | u8::from(is_out(h)) << k)
+            };
+            outside_all &= bits(|height| height <= 0.0);
+            outside_any |= bits(|height| height < 0.0);
         }
-        for plane in planes {
-            if self.corners.iter().any(|&c| plane(c) < 0.0) {
+        if outside_all != 0 {
+            return false;
+        }
+        let planes: [fn(DVec3) -> f64; 4] = [|p| p.z - p.x, |p| p.z + p.x, |p| p.z - p.y, |p| p.z + p.y];
+        for (k, plane) in planes.into_iter().enumerate() {
+            if outside_any >> k & 1 == 1 {
                 polygon::clip_by(&self.corners, plane, &mut self.clipped);
                 std::mem::swap(&mut self.corners, &mut self.clipped);
             }
