@@ -90,16 +90,19 @@ impl RowSource for RayRows<'_> {
         random.shuffle(&mut origins);
         let directions = jittered(count, &mut random);
 
+        // The element's own plane is met at distance 0, on either side by rounding.
+        let in_sight: Vec<bool> = scene
+            .patches
+            .iter()
+            .zip(&scene.faces)
+            .map(|(piece, &face)| face != scene.faces[i] && reaches_in_front(piece, patch))
+            .collect();
         let mut hits = vec![0u32; scene.len()];
         let (mut escaped, mut absorbed) = (0, 0);
         for (&origin, &direction) in origins.iter().zip(&directions) {
             let local = cosine_direction(direction);
             let direction = local.x * u + local.y * v + local.z * patch.plane.normal;
-            let seen = |j: usize, front: bool| {
-                (front || !self.two_sided[j])
-                    && scene.faces[j] != scene.faces[i]
-                    && reaches_in_front(&scene.patches[j], patch)
-            };
+            let seen = |j: usize, front: bool| in_sight[j] && (front || !self.two_sided[j]);
             match self.caster.closest_where(map.place(origin), direction, seen) {
                 Some(hit) if hit.front => hits[hit.piece] += 1,
                 Some(_) => absorbed += 1,
