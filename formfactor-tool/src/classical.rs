@@ -34,7 +34,7 @@ pub enum Form {
 
 /// Share of a row's error given to the form itself: factors add up to about 1.
 const FORM_SHARE: f64 = 0.5;
-/// Looser than this neither form gets cheaper.
+/// Never asked more loosely than this: what a row misses of 1 counts 1 / (1 - rho) times when solving.
 const LOOSEST: f64 = 2e-3;
 /// Tighter than this is rounding.
 const TIGHTEST: f64 = 1e-12;

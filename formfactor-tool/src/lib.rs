@@ -2,6 +2,7 @@
 //!
 //! # Limitations
 //! The matrix is computed in memory and written at the end: dense blocks of about 8 bytes per pair that sees each other.
+//! The hemicube and the rays besides keep the rows until the end: 20 bytes per element that each element sees.
 
 #![forbid(unsafe_code)]
 

@@ -19,6 +19,14 @@ const METHODS: [&[&str]; 6] = [
     &["--method", "rays", "--rays", "30000"],
 ];
 
+/// The same, cheaper: where the accuracy is not looked at.
+const QUICK: [&[&str]; 4] = [
+    &["--method", "contour", "--tolerance", "1e-2"],
+    &["--method", "area", "--tolerance", "0.5"],
+    &["--method", "hemicube", "--resolution", "31"],
+    &["--method", "rays", "--rays", "1000"],
+];
+
 /// The matrix under a name of its own.
 fn kept(folder: &Path, mesh: &Mesh, name: &str, flags: &[&str]) -> PathBuf {
     let (matrix, run) = compute_mesh(folder, mesh, flags);
@@ -157,7 +165,7 @@ fn the_matrix_of_every_method_does_not_depend_on_threads() {
     let folder = tempfile::tempdir().unwrap();
     let mut mesh = mesh_of(&subdivided(&room_with_box(), 2));
     cluster(&mut mesh, 8);
-    for flags in METHODS {
+    for flags in QUICK {
         let bytes = |threads: &str| {
             let flags: Vec<&str> = flags.iter().copied().chain(["--threads", threads]).collect();
             std::fs::read(kept(folder.path(), &mesh, "a.ff", &flags)).unwrap()
@@ -166,9 +174,46 @@ fn the_matrix_of_every_method_does_not_depend_on_threads() {
     }
     let auto = Matrix::open(&kept(folder.path(), &mesh, "b.ff", &[])).unwrap().provenance().flags.clone();
     assert_eq!(auto, ["--tolerance 0.0001"]);
-    let rays = kept(folder.path(), &mesh, "b.ff", METHODS[4]);
+    let rays = kept(folder.path(), &mesh, "b.ff", QUICK[3]);
     let flags = Matrix::open(&rays).unwrap().provenance().flags.clone();
     assert_eq!(flags, ["--tolerance 0.0001", "--method rays", "--rays 1000"]);
+}
+
+/// Scaled by powers of two nothing rounds differently, so rays hit the same elements and item buffers hold the same; the
+/// entries grow with the square.
+#[test]
+fn scale_does_not_matter_to_any_method() {
+    let folder = tempfile::tempdir().unwrap();
+    let scaled = |scale: f64| {
+        let mut mesh = mesh_of(&subdivided(&room_with_box(), 2));
+        cluster(&mut mesh, 8);
+        mesh.vertices.iter_mut().flatten().for_each(|x| *x *= scale);
+        mesh
+    };
+    for flags in QUICK {
+        let unit = entries(&kept(folder.path(), &scaled(1.0), "unit.ff", flags));
+        for scale in [2.0f64.powi(-30), 2.0f64.powi(30)] {
+            let other = entries(&kept(folder.path(), &scaled(scale), "scaled.ff", flags));
+            for (a, b) in unit.iter().flatten().zip(other.iter().flatten()) {
+                assert_eq!(*a, b / (scale * scale), "{flags:?} at scale {scale:e}");
+            }
+        }
+    }
+}
+
+/// What clusters settle is zero by any method: with the skips off every factor stays the same.
+#[test]
+fn skips_of_clusters_change_no_method() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut mesh = mesh_of(&subdivided(&room_with_box(), 2));
+    cluster(&mut mesh, 8);
+    for flags in QUICK {
+        let with = kept(folder.path(), &mesh, "with.ff", flags);
+        let off = "same-plane,behind-clusters,convex-enclosure,covered,inherited-blockers";
+        let flags: Vec<&str> = flags.iter().copied().chain(["--no-skip", off]).collect();
+        let without = kept(folder.path(), &mesh, "without.ff", &flags);
+        assert!(entries(&with) == entries(&without), "{flags:?}");
+    }
 }
 
 #[test]
@@ -201,7 +246,7 @@ fn compare_tells_the_worst_row_and_entry_and_where() {
     let mut mesh = mesh_of(&subdivided(&room_with_box(), 2));
     cluster(&mut mesh, 8);
     let exact = kept(folder.path(), &mesh, "exact.ff", &["--tolerance", "1e-6"]);
-    let rays = kept(folder.path(), &mesh, "rays.ff", METHODS[4]);
+    let rays = kept(folder.path(), &mesh, "rays.ff", QUICK[3]);
     let file = folder.path().join("s.mesh");
     let (a, b) = (rays.as_os_str(), exact.as_os_str());
     let run = compare(&[a, b, "--json".as_ref(), "--mesh".as_ref(), file.as_os_str()]).success();
@@ -253,7 +298,7 @@ fn compare_fails_beyond_max_and_on_other_meshes() {
     let folder = tempfile::tempdir().unwrap();
     let cube = mesh_of(&inward_cube(0.0, 1.0));
     let exact = kept(folder.path(), &cube, "exact.ff", &[]);
-    let rays = kept(folder.path(), &cube, "rays.ff", METHODS[4]);
+    let rays = kept(folder.path(), &cube, "rays.ff", QUICK[3]);
     let differs = row_differences(&rays, &exact).into_iter().fold(0.0, f64::max);
     let with_max = |most: f64| {
         compare(&[rays.as_os_str(), exact.as_os_str(), "--max".as_ref(), most.to_string().as_ref()])
