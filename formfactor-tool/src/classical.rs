@@ -15,12 +15,13 @@ use crate::visible_share::{RAYS, visible_share};
 use geometry::area_rule::Separation;
 use geometry::contour::{Exchange, contour};
 use geometry::occluder::separated;
-use geometry::pair::Class;
 use geometry::patch::Patch;
 use geometry::ray_cast::RayCaster;
-use geometry::unoccluded::{Facing, Rule, facing, mutual_parts};
+use geometry::sides::SideBits;
+use geometry::unoccluded::{Facing, facing, mutual_parts};
 use glam::DVec3;
 use interchange::report::Report;
+use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The form of the integral.
@@ -45,6 +46,8 @@ pub struct Classical<'a> {
     scene: &'a Scene,
     form: Form,
     relative: f64,
+    /// Side facts of each element against each occluder.
+    sides: Vec<SideBits>,
     caster: RayCaster,
     rays: AtomicUsize,
 }
@@ -56,6 +59,11 @@ impl<'a> Classical<'a> {
         Self {
             scene,
             form,
+            sides: scene
+                .patches
+                .par_iter()
+                .map(|p| SideBits::of_patch(&p.corners, &p.plane, p.radius, &scene.occluders))
+                .collect(),
             relative: (FORM_SHARE * tolerance).clamp(TIGHTEST, LOOSEST),
             caster: RayCaster::new(&blockers),
             rays: AtomicUsize::new(0),
@@ -77,7 +85,7 @@ impl<'a> Classical<'a> {
         match parts {
             Some((p, q)) => self.in_front(i, j, (&p, &q), pair, builder),
             None => {
-                builder.counts().add_class(Class::Invisible);
+                builder.counts().behind += 1;
                 Exchange::NONE
             }
         }
@@ -91,18 +99,20 @@ impl<'a> Classical<'a> {
         pair: &LeafPair,
         builder: &mut TileBuilder,
     ) -> Exchange {
-        let scene = self.scene;
-        let may_block = |k: usize| scene.sides[i].may_block(&scene.sides[j], k);
+        let (occluders, sides) = (&self.scene.occluders, [&self.sides[i], &self.sides[j]]);
         let shaft: Vec<DVec3> = p.corners.iter().chain(&q.corners).copied().collect();
-        let mut blockers = pair
-            .blockers
-            .iter()
-            .map(|&k| k as usize)
-            .filter(|&k| may_block(k) && !separated(&shaft, &scene.occluders[k].corners))
-            .peekable();
-        let open = blockers.peek().is_none();
-        if blockers.any(|k| scene.occluders[k].covers(&p.corners, &q.corners)) {
-            builder.counts().add_class(Class::FullyBlocked);
+        let (mut open, mut covered) = (true, false);
+        // The traversal proved that nothing stands between any two elements of the pair of clusters, or did not.
+        if !pair.blockers.is_empty() {
+            sides[0].for_each_candidate(sides[1], occluders.len(), |k| {
+                if !covered && !separated(&shaft, &occluders[k].corners) {
+                    open = false;
+                    covered = occluders[k].covers(&p.corners, &q.corners);
+                }
+            });
+        }
+        if covered {
+            builder.counts().covered += 1;
             return Exchange::NONE;
         }
 
@@ -116,14 +126,14 @@ impl<'a> Classical<'a> {
             Form::Area => area_form(p, q, self.relative),
         };
         if open {
-            let rule = if self.form == Form::Contour { Rule::Contour } else { Rule::Product };
-            builder.counts().add_class(Class::Unoccluded(rule));
+            let rule = if self.form == Form::Contour { 4 } else { 3 };
+            builder.counts().unoccluded[rule] += 1;
             return whole;
         }
         builder.counts().occluded += 1;
         self.rays.fetch_add(RAYS, Ordering::Relaxed);
-        let share =
-            visible_share(p, q, (i, j), |from, to| self.caster.any_between(from, to, |k| !may_block(k)));
+        let passes = |k: usize| !sides[0].may_block(sides[1], k);
+        let share = visible_share(p, q, (i, j), |from, to| self.caster.any_between(from, to, passes));
         let error = share.value * whole.error + share.error * whole.value;
         Exchange { value: share.value * whole.value, error }
     }

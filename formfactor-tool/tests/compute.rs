@@ -4,8 +4,35 @@
 mod common;
 
 use assert_cmd::Command;
-use common::{compute, entries, inward_cube, room_with_box};
+use common::{inward_cube, mesh_of, room_with_box};
 use interchange::matrix::{Matrix, Precision};
+use interchange::provenance::Provenance;
+use std::path::{Path, PathBuf};
+
+fn compute(
+    folder: &Path,
+    polygons: &[Vec<[f64; 3]>],
+    flags: &[&str],
+) -> (PathBuf, assert_cmd::assert::Assert) {
+    let (mesh, matrix) = (folder.join("s.mesh"), folder.join("s.ff"));
+    mesh_of(polygons).write(&mesh, Provenance::new("test", "1")).unwrap();
+    let mut command = Command::cargo_bin("formfactor-tool").unwrap();
+    let run = command.arg("compute").arg(&mesh).arg("-o").arg(&matrix).args(flags).assert();
+    (matrix, run)
+}
+
+fn entries(path: &Path) -> Vec<Vec<f64>> {
+    let matrix = Matrix::open(path).unwrap();
+    let n = matrix.element_count();
+    let mut s = vec![vec![0.0; n]; n];
+    matrix
+        .for_each(|i, j, value| {
+            s[i][j] = value;
+            s[j][i] = value;
+        })
+        .unwrap();
+    s
+}
 
 #[test]
 fn unit_cube_has_its_closed_form_factors() {

@@ -1,12 +1,8 @@
-//! Meshes built in code, and the program run on them.
-#![allow(dead_code, missing_docs, clippy::unwrap_used)]
+//! Meshes built in code.
+#![allow(dead_code)]
 
-use assert_cmd::Command;
 use interchange::ids::{FaceId, GroupId, MaterialId, NodeId, VertexId};
-use interchange::matrix::Matrix;
 use interchange::mesh::{Cluster, Mesh};
-use interchange::provenance::Provenance;
-use std::path::{Path, PathBuf};
 
 /// The six squares of an axis-aligned cube, fronts inward.
 pub fn inward_cube(low: f64, high: f64) -> Vec<Vec<[f64; 3]>> {
@@ -46,6 +42,7 @@ pub fn mesh_of(polygons: &[Vec<[f64; 3]>]) -> Mesh {
     mesh
 }
 
+/// A unit room with a box in its middle.
 pub fn room_with_box() -> Vec<Vec<[f64; 3]>> {
     let mut polygons = inward_cube(0.0, 1.0);
     polygons.extend(inward_cube(0.25, 0.75).into_iter().map(|mut face| {
@@ -55,64 +52,38 @@ pub fn room_with_box() -> Vec<Vec<[f64; 3]>> {
     polygons
 }
 
-pub fn compute(
-    folder: &Path,
-    polygons: &[Vec<[f64; 3]>],
-    flags: &[&str],
-) -> (PathBuf, assert_cmd::assert::Assert) {
-    compute_mesh(folder, &mesh_of(polygons), flags)
-}
-
-pub fn compute_mesh(folder: &Path, mesh: &Mesh, flags: &[&str]) -> (PathBuf, assert_cmd::assert::Assert) {
-    let (path, matrix) = (folder.join("s.mesh"), folder.join("s.ff"));
-    mesh.write(&path, Provenance::new("test", "1")).unwrap();
-    let mut command = Command::cargo_bin("formfactor-tool").unwrap();
-    let run = command.arg("compute").arg(&path).arg("-o").arg(&matrix).args(flags).assert();
-    (matrix, run)
-}
-
-pub fn entries(path: &Path) -> Vec<Vec<f64>> {
-    let matrix = Matrix::open(path).unwrap();
-    let n = matrix.element_count();
-    let mut s = vec![vec![0.0; n]; n];
-    matrix
-        .for_each(|i, j, value| {
-            s[i][j] = value;
-            s[j][i] = value;
-        })
-        .unwrap();
-    s
-}
-
-/// Every square cut into n x n, all parts faces of their own.
-pub fn subdivided(squares: &[Vec<[f64; 3]>], n: usize) -> Vec<Vec<[f64; 3]>> {
+/// Each polygon, a parallelogram, cut into n x n.
+pub fn divided(polygons: &[Vec<[f64; 3]>], n: usize) -> Vec<Vec<[f64; 3]>> {
     let mut parts = Vec::new();
-    for square in squares {
-        let at = |i: usize, j: usize| {
-            let (s, t) = (i as f64 / n as f64, j as f64 / n as f64);
-            [0, 1, 2]
-                .map(|k| square[0][k] + s * (square[1][k] - square[0][k]) + t * (square[3][k] - square[0][k]))
+    for corners in polygons {
+        let place = |u: usize, v: usize| {
+            let (u, v) = (u as f64 / n as f64, v as f64 / n as f64);
+            let along = |k: usize| {
+                let (a, b, d) = (corners[0][k], corners[1][k], corners[3][k]);
+                a + u * (b - a) + v * (d - a)
+            };
+            [along(0), along(1), along(2)]
         };
-        for (i, j) in (0..n * n).map(|k| (k % n, k / n)) {
-            parts.push(vec![at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+        for u in 0..n {
+            for v in 0..n {
+                parts.push(vec![place(u, v), place(u + 1, v), place(u + 1, v + 1), place(u, v + 1)]);
+            }
         }
     }
     parts
 }
 
-/// A cluster tree by halving, down to `largest` elements a leaf.
-pub fn cluster(mesh: &mut Mesh, largest: u32) {
-    let count = mesh.element_count() as u32;
-    mesh.clusters = vec![Cluster { start: 0, end: count, first_child: 0, second_child: 0 }];
-    let mut next = 0;
-    while next < mesh.clusters.len() {
-        let Cluster { start, end, .. } = mesh.clusters[next];
-        if end - start > largest {
-            let (middle, first) = ((start + end) / 2, mesh.clusters.len() as u32);
-            mesh.clusters.push(Cluster { start, end: middle, first_child: 0, second_child: 0 });
-            mesh.clusters.push(Cluster { start: middle, end, first_child: 0, second_child: 0 });
-            mesh.clusters[next] = Cluster { start, end, first_child: first, second_child: first + 1 };
-        }
-        next += 1;
+/// A mesh with a leaf cluster for every `leaf` elements, in a chain.
+pub fn clustered(polygons: &[Vec<[f64; 3]>], leaf: u32) -> Mesh {
+    let mut mesh = mesh_of(polygons);
+    mesh.clusters.clear();
+    let (mut start, end) = (0, polygons.len() as u32);
+    while start + leaf < end {
+        let own = mesh.clusters.len() as u32;
+        mesh.clusters.push(Cluster { start, end, first_child: own + 1, second_child: own + 2 });
+        mesh.clusters.push(Cluster { start, end: start + leaf, first_child: 0, second_child: 0 });
+        start += leaf;
     }
+    mesh.clusters.push(Cluster { start, end, first_child: 0, second_child: 0 });
+    mesh
 }
