@@ -1,9 +1,8 @@
 //! `compute`: a mesh file in, a matrix file out.
 
 use crate::closure::{self, Closed};
-use crate::estimator::Estimator;
-use crate::exact::Exact;
 use crate::journal::{self, Journal, Run};
+use crate::method::Choice;
 use crate::options::{Shard, Storage};
 use crate::plan;
 use crate::scene::Scene;
@@ -30,6 +29,8 @@ pub struct Request {
     pub output: PathBuf,
     /// Bound on the estimated sum over j of |error of F_ij| in any row.
     pub tolerance: f64,
+    /// How the entries are computed.
+    pub method: Choice,
     /// Skips turned off.
     pub no_skip: Vec<Skip>,
     /// How the matrix is stored.
@@ -42,22 +43,31 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     let tolerance = request.tolerance;
     let skips = Skips::without(&request.no_skip);
     let mut report = Report::new("formfactor-tool", env!("CARGO_PKG_VERSION"));
-    let flags = std::iter::once(format!("--tolerance {tolerance}")).chain(request.storage.flags());
-    report.flags.extend(flags);
+    report.flags.push(format!("--tolerance {tolerance}"));
+    report.flags.extend(request.method.flags());
+    report.flags.extend(request.storage.flags());
     let (mesh, _, digest) = report.phase("read", || Mesh::read(&request.mesh))?;
     let scene = report.phase("prepare", || Scene::new(&mesh, &skips))?;
     let (pairs, settled) = report.phase("traverse", || leaf_pairs(&scene, &skips));
 
-    let estimator = report.phase("look", || Exact::new(&scene, &skips, &pairs, tolerance));
+    let estimator = report.phase("look", || request.method.estimator(&scene, &skips, &pairs, tolerance));
     let shard = request.storage.shard.unwrap_or(Shard { part: 0, parts: 1 });
     let all_pairs = pairs.len();
-    let pairs = shards::pairs_of(pairs, &estimator, shard);
+    let pairs = shards::pairs_of(pairs, estimator.as_ref(), shard);
 
     let precision = request.storage.precision(tolerance);
     let threads = rayon::current_num_threads();
     let memory = plan::memory(&pairs, scene.len(), threads, plan::resident(), request.storage.memory)?;
     if request.storage.dry_run {
-        print_data(&plan::describe(&scene, &pairs, &settled, &estimator, precision, memory, threads))?;
+        print_data(&plan::describe(
+            &scene,
+            &pairs,
+            &settled,
+            estimator.as_ref(),
+            precision,
+            memory,
+            threads,
+        ))?;
         return Ok(Finish::Done);
     }
     if request.storage.memory.is_some() && !common.quiet {

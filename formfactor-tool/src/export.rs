@@ -72,7 +72,7 @@ fn mtx(factors: &Factors<'_>, by: By, output: &Path) -> Result<()> {
 }
 
 /// F between the keys of a grouping, row by row.
-struct Factors<'a> {
+pub(crate) struct Factors<'a> {
     views: Vec<BlockView<'a>>,
     keys: &'a [u32],
     /// Area of each key.
@@ -83,7 +83,8 @@ struct Factors<'a> {
 }
 
 impl<'a> Factors<'a> {
-    fn new(matrix: &'a Matrix, grouping: &'a Grouping) -> Result<Self> {
+    /// Of the keys of a grouping of the matrix's elements.
+    pub(crate) fn new(matrix: &'a Matrix, grouping: &'a Grouping) -> Result<Self> {
         let element_areas = matrix.areas()?;
         let count = grouping.len();
         Ok(Self {
@@ -96,7 +97,7 @@ impl<'a> Factors<'a> {
     }
 
     /// All rows in order: key and F(key -> every key).
-    fn rows(&self) -> impl Iterator<Item = (usize, Vec<f64>)> + '_ {
+    pub(crate) fn rows(&self) -> impl Iterator<Item = (usize, Vec<f64>)> + '_ {
         (0..self.count).step_by(self.band).flat_map(move |first| {
             let band = first..(first + self.band).min(self.count);
             let sums = self.sums(band.clone());

@@ -108,14 +108,14 @@ pub fn describe(paths: &[impl AsRef<Path>], as_json: bool) -> Result<String> {
 }
 
 /// Least, mean and largest value.
-struct Spread {
-    least: f64,
-    mean: f64,
-    largest: f64,
+pub(crate) struct Spread {
+    pub(crate) least: f64,
+    pub(crate) mean: f64,
+    pub(crate) largest: f64,
 }
 
 impl Spread {
-    fn of(values: &[f64]) -> Self {
+    pub(crate) fn of(values: &[f64]) -> Self {
         Self {
             least: values.iter().copied().fold(f64::INFINITY, f64::min),
             mean: values.iter().sum::<f64>() / values.len().max(1) as f64,
@@ -123,11 +123,11 @@ impl Spread {
         }
     }
 
-    fn json(&self) -> Value {
+    pub(crate) fn json(&self) -> Value {
         json!({ "least": self.least, "mean": self.mean, "largest": self.largest })
     }
 
-    fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         format!("{:.6e} least, {:.6e} mean, {:.6e} largest", self.least, self.mean, self.largest)
     }
 }

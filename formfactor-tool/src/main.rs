@@ -1,10 +1,11 @@
 //! Command line of the form-factor stage.
 
-use clap::{Parser, Subcommand, ValueEnum};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
 use formfactor_tool::closure::Closure;
 use formfactor_tool::options::Storage;
 use formfactor_tool::skips::Skip;
-use formfactor_tool::{compute, export, info, merge};
+use formfactor_tool::{compare, compute, export, info, merge, method};
 use interchange::grouping::By;
 use interchange::tool::{Common, EXIT_CODES, Finish, exit_code, print_data};
 use std::path::PathBuf;
@@ -32,9 +33,8 @@ enum Command {
         /// Bound on the estimated sum over j of |error of F_ij| in any row
         #[arg(long, default_value = "1e-4", value_parser = compute::parse_tolerance)]
         tolerance: f64,
-        /// Method: auto takes the cheapest exact or adaptive rule per pair
-        #[arg(long, value_enum, default_value = "auto")]
-        method: Method,
+        #[command(flatten)]
+        method: method::Flags,
         /// Do this work even where it is provably not needed
         #[arg(long, value_enum, value_name = "NAME", value_delimiter = ',')]
         no_skip: Vec<Skip>,
@@ -68,6 +68,22 @@ enum Command {
         #[arg(short, long, value_name = "FILE")]
         output: PathBuf,
     },
+    /// Show by how much two matrices of one mesh differ
+    Compare {
+        /// Matrix file
+        first: PathBuf,
+        /// Matrix file to compare it with
+        second: PathBuf,
+        /// The mesh of both, to name face and group of the worst places
+        #[arg(long, value_name = "FILE")]
+        mesh: Option<PathBuf>,
+        /// The same as JSON
+        #[arg(long)]
+        json: bool,
+        /// Fail (exit 1) where the sum over j of |dF_ij| is above this in some row
+        #[arg(long, value_name = "E", value_parser = compare::parse_most)]
+        max: Option<f64>,
+    },
     /// Describe a matrix file on one page
     Info {
         /// Matrix file, one shard, or all files of one computed in shards
@@ -79,21 +95,22 @@ enum Command {
     },
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Method {
-    Auto,
-}
-
 fn run(cli: Cli) -> anyhow::Result<Finish> {
     match cli.command {
-        Command::Compute { mesh, output, tolerance, method: Method::Auto, no_skip, storage } => {
-            let request = compute::Request { mesh, output, tolerance, no_skip, storage };
+        Command::Compute { mesh, output, tolerance, method, no_skip, storage } => {
+            let method = method.choice().map_err(anyhow::Error::msg)?;
+            let request = compute::Request { mesh, output, tolerance, method, no_skip, storage };
             return compute::run(&request, &cli.common);
         }
         Command::Merge { shards, output, closure } => {
             return merge::run(&merge::Request { shards, output, closure }, &cli.common);
         }
         Command::Export { matrix, mesh, by, output } => export::run(&matrix, &mesh, by, &output)?,
+        Command::Compare { first, second, mesh, json, max } => {
+            let difference = compare::Difference::between(&first, &second, mesh.as_deref())?;
+            print_data(&difference.describe(json)?)?;
+            difference.check(max)?;
+        }
         Command::Info { file, json } => print_data(&info::describe(&file, json)?)?,
     }
     Ok(Finish::Done)
@@ -101,6 +118,11 @@ fn run(cli: Cli) -> anyhow::Result<Finish> {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
+    if let Command::Compute { method, .. } = &cli.command
+        && let Err(message) = method.choice()
+    {
+        Cli::command().error(ErrorKind::ArgumentConflict, message).exit();
+    }
     cli.common.start();
     exit_code("formfactor-tool", run(cli))
 }

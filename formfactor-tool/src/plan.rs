@@ -81,7 +81,7 @@ pub fn describe(
     scene: &Scene,
     pairs: &[LeafPair],
     settled: &Settled,
-    estimator: &impl Estimator,
+    estimator: &dyn Estimator,
     precision: Precision,
     memory: Memory,
     threads: usize,
@@ -173,7 +173,12 @@ mod tests {
 
     #[test]
     fn memory_is_bounded_by_what_is_allowed_or_refused() {
-        let pair = |k: usize| LeafPair { rows: k..k + 100, columns: 9000..9100, blockers: Vec::new() };
+        let pair = |k: usize| LeafPair {
+            rows: k..k + 100,
+            columns: 9000..9100,
+            clusters: [0, 1],
+            blockers: Vec::new(),
+        };
         let pairs: Vec<LeafPair> = (0..2000).map(|k| pair(4 * k)).collect();
         let free = memory(&pairs, 10_000, 2, 1 << 25, None);
         assert!(free.is_ok_and(|memory| memory.in_flight == IN_FLIGHT));

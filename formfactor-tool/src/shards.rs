@@ -9,7 +9,7 @@ use crate::traversal::LeafPair;
 const RUNS: f64 = 32.0;
 
 /// The pairs of one shard, in order. The shards of one N share no pair and miss none.
-pub fn pairs_of(pairs: Vec<LeafPair>, estimator: &impl Estimator, shard: Shard) -> Vec<LeafPair> {
+pub fn pairs_of(pairs: Vec<LeafPair>, estimator: &dyn Estimator, shard: Shard) -> Vec<LeafPair> {
     let works: Vec<f64> = pairs.iter().map(|pair| estimator.work(pair)).collect();
     let total: f64 = works.iter().sum();
     let runs = RUNS * f64::from(shard.parts);
@@ -47,7 +47,12 @@ mod tests {
     #[test]
     fn every_pair_is_in_one_shard_and_work_is_even() {
         let pairs: Vec<LeafPair> = (0..2000)
-            .map(|k| LeafPair { rows: k..k + 1, columns: k + 1..k + 2, blockers: Vec::new() })
+            .map(|k| LeafPair {
+                rows: k..k + 1,
+                columns: k + 1..k + 2,
+                clusters: [k, k + 1],
+                blockers: Vec::new(),
+            })
             .collect();
         for parts in [1, 3, 5] {
             let shards: Vec<Vec<LeafPair>> =

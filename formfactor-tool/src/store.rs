@@ -215,7 +215,7 @@ mod tests {
         let scene = Scene {
             patches: Vec::new(),
             faces: Vec::new(),
-            sides: Vec::new(),
+            bodies: Vec::new(),
             occluders: Vec::new(),
             clusters: Vec::new(),
             convex: true,

@@ -40,7 +40,7 @@ const CORNER_INSET: f64 = 1e-3;
 const CORNER_ERROR: f64 = 0.1;
 /// Share of the distance between the 2 x 2 rule and the centre's value that counts as error where edges of different
 /// bodies may cross: the view's second derivative may jump there, of which the rule misses a part.
-const KINK: f64 = 0.03;
+const KINK: f64 = 0.1;
 /// A cell whose corners are this many times farther off than its centre has a bend inside: higher orders do not help there.
 const BENT: f64 = 8.0;
 /// Up to this many shadow planes the receiver is cut along all of them at once; where there are more, along those that

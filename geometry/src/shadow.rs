@@ -31,6 +31,9 @@ fn stand(set: Set<'_>, face: &Plane, body: &Body) -> Standing {
     match (low >= -tolerance, high <= tolerance) {
         (true, true) if body.is_flat() => 1,
         (true, true) => set.normal.map_or(0, |n| if n.dot(face.normal) > 0.0 { 1 } else { -1 }),
+        // Some of a mixed set may lie on the plane and look either way.
+        (true, false) if set.normal.is_none() && low <= tolerance => 0,
+        (false, true) if set.normal.is_none() && high >= -tolerance => 0,
         (true, false) => 1,
         (false, true) => -1,
         (false, false) => 0,
@@ -209,7 +212,8 @@ impl<'a> Shadows<'a> {
             return Blocking::Nothing;
         }
         let is_outside = |range: Range<usize>| self.standings[range].contains(&1);
-        if !body.is_flat() && !(is_outside(of_first) && is_outside(of_second)) {
+        let are_outside = is_outside(of_first) && is_outside(of_second);
+        if !body.is_flat() && !are_outside {
             return Blocking::Inside;
         }
         let nothing = [mark.edges..mark.edges, mark.edges..mark.edges];

@@ -6,9 +6,8 @@ use crate::block_sums::sums_of;
 use crate::counts::Counts;
 use crate::store::StoredTile;
 use crate::traversal::LeafPair;
-use geometry::pair::{self, Accuracy};
 use geometry::patch::Patch;
-use geometry::visible::Scratch;
+use geometry::unoccluded::exchange;
 use glam::DVec3;
 use interchange::atomic_write::Partial;
 use interchange::digest::Digest;
@@ -43,15 +42,12 @@ fn cube() -> Vec<Patch> {
 
 /// S of the cube: the upper triangle, row after row.
 fn exact(patches: &[Patch]) -> Vec<f64> {
-    let accuracy = Accuracy { unoccluded: 1e-12, occluded: 1e-12, least_factor: 0.0, most_evaluations: 1 };
-    let (mut blockers, mut scratch) = (Vec::new(), Scratch::default());
     let mut entries = Vec::new();
     for (i, first) in patches.iter().enumerate() {
         for second in &patches[i..] {
             let flat = first.plane.normal.dot(second.plane.normal) > 0.5;
-            let found =
-                pair::exchange(first, second, std::iter::empty(), accuracy, &mut blockers, &mut scratch);
-            entries.push(if flat { 0.0 } else { found.0.value });
+            let (found, _) = exchange(first, second, 1e-12);
+            entries.push(if flat { 0.0 } else { found.value });
         }
     }
     entries
@@ -74,7 +70,7 @@ fn stored(folder: &std::path::Path, areas: &[f64], entries: &[f64], row_error: f
     let mut store = Store::create(partial, Provenance::new("test", "1"), record, areas).unwrap();
     let packed = PackedBlock::new(0..n as u32, 0..n as u32, true, entries, Precision::F64, true);
     let sums = sums_of(&packed.view());
-    let pair = LeafPair { rows: 0..n, columns: 0..n, blockers: Vec::new() };
+    let pair = LeafPair { rows: 0..n, columns: 0..n, clusters: [0, 0], blockers: Vec::new() };
     let errors = vec![row_error; n];
     store.add(&pair, &StoredTile { packed: Some(packed), errors, sums, counts: Counts::default() }).unwrap();
     store
