@@ -11,30 +11,32 @@ use glam::DVec3;
 /// A scene prepared for gathering.
 #[derive(Debug)]
 pub struct Gatherer {
-    occluders: Vec<Occluder>,
+    pub(crate) occluders: Vec<Occluder>,
     /// Elements with area, and their places in the caller's order.
-    elements: Vec<(usize, Patch, SideBits)>,
+    pub(crate) elements: Vec<(usize, Patch, SideBits)>,
 }
 
 /// Working memory of [`Gatherer::factors`].
 #[derive(Debug, Default)]
 pub struct Scratch {
-    visible: visible::Scratch,
-    cut: Vec<DVec3>,
-    cones: Vec<Option<Cone>>,
+    pub(crate) visible: visible::Scratch,
+    pub(crate) cut: Vec<DVec3>,
+    pub(crate) cones: Vec<Option<Cone>>,
+    /// Stack of candidate lists of a [`crate::source_tree::SourceTree`].
+    pub(crate) candidates: Vec<u32>,
 }
 
 /// A body as a point sees it: within `cosine` of `direction`.
 #[derive(Debug, Clone, Copy)]
-struct Cone {
-    direction: DVec3,
-    cosine: f64,
-    sine: f64,
+pub(crate) struct Cone {
+    pub(crate) direction: DVec3,
+    pub(crate) cosine: f64,
+    pub(crate) sine: f64,
 }
 
 impl Cone {
     /// Cone around a ball; `None` where the point is inside.
-    fn around(to_centre: DVec3, radius: f64) -> Option<Cone> {
+    pub(crate) fn around(to_centre: DVec3, radius: f64) -> Option<Cone> {
         let distance = to_centre.length();
         let sine = radius / distance;
         (sine < 1.0).then(|| Cone {
@@ -45,7 +47,7 @@ impl Cone {
     }
 
     /// Whether two cones may share a direction: cos of the angle between against cos of the sum of the half angles.
-    fn may_meet(&self, other: &Cone) -> bool {
+    pub(crate) fn may_meet(&self, other: &Cone) -> bool {
         self.direction.dot(other.direction) >= self.cosine * other.cosine - self.sine * other.sine
     }
 }
@@ -76,7 +78,7 @@ impl Gatherer {
     ) {
         let plane = Plane { normal, origin: point };
         let sides = SideBits::of_point(&plane, &self.occluders);
-        let Scratch { visible, cut, cones } = scratch;
+        let Scratch { visible, cut, cones, .. } = scratch;
         cones.clear();
         cones.extend(self.occluders.iter().map(|o| Cone::around(o.centre - point, o.radius)));
 

@@ -23,6 +23,7 @@ pub mod ray_cast;
 pub mod shadow;
 pub mod shadow_planes;
 pub mod sides;
+pub mod source_tree;
 pub mod strata;
 pub mod unoccluded;
 pub mod visible;

@@ -10,7 +10,7 @@ mod polygons;
 mod settings;
 mod statement;
 
-pub use settings::{CameraSettings, Settings};
+pub use settings::{CameraSettings, ProjectionSettings, Settings};
 
 use crate::digest::Digest;
 use crate::error::Result;

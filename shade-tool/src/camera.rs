@@ -1,13 +1,16 @@
-//! Pinhole camera: from the scene's toml, from the command line, or framing the scene from outside.
+//! Cameras: from the scene's toml, from the command line, or framing the scene from outside.
 //!
-//! Right-handed: seen along the view, right is view x up. The picture plane lies at distance 1 before the eye; pixels are
-//! square, so of film and vertical angle only one dimension counts (the film's width, the angle's height).
+//! Right-handed: seen along the view, right is view x up. A pinhole's picture plane lies at distance 1 before the eye; an
+//! orthographic picture has its true size on a plane through the eye, and shows what lies before that plane; a panorama
+//! shows all directions, longitudes along the rows and latitudes along the columns, the view in the middle. Pixels are
+//! square, so of film and vertical extent only one dimension counts (the film's width, the others' height).
 
 use crate::error::{Error, Result};
 use glam::DVec3;
 use interchange::error::nearest_name;
-use interchange::scene::CameraSettings;
+use interchange::scene::{CameraSettings, ProjectionSettings};
 use interchange::tables::number;
+use std::f64::consts::{PI, TAU};
 
 /// Vertical field of view, degrees, where nothing says another.
 pub const DEFAULT_FOV_DEG: f64 = 40.0;
@@ -32,6 +35,21 @@ pub enum Lens {
     },
     /// Full vertical angle in degrees.
     Vertical(f64),
+    /// Orthographic, with the height of the picture in the scene's unit.
+    Orthographic(f64),
+    /// All directions.
+    Panorama,
+}
+
+/// How a place of the picture becomes a ray.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Projection {
+    /// Through a pinhole.
+    Perspective,
+    /// Parallel.
+    Orthographic,
+    /// Equirectangular.
+    Panorama,
 }
 
 /// What the command line says of the camera; each part wins over the toml's.
@@ -62,7 +80,9 @@ pub struct Camera {
     pub right: DVec3,
     /// Unit vector against the columns.
     pub up: DVec3,
-    /// Half the width and half the height of the picture at distance 1.
+    /// How places become rays.
+    pub projection: Projection,
+    /// Half the width and half the height of the picture: at distance 1, in the scene's unit, or in radians.
     pub half: [f64; 2],
     /// Width and height in pixels.
     pub size: [u32; 2],
@@ -105,7 +125,12 @@ impl Camera {
         }
         let right = side.normalize();
         let half = half_extent(lens, size)?;
-        Ok(Camera { eye, forward, right, up: right.cross(forward), half, size, framing: false })
+        let projection = match lens {
+            Lens::Film { .. } | Lens::Vertical(_) => Projection::Perspective,
+            Lens::Orthographic(_) => Projection::Orthographic,
+            Lens::Panorama => Projection::Panorama,
+        };
+        Ok(Camera { eye, forward, right, up: right.cross(forward), projection, half, size, framing: false })
     }
 
     /// A camera outside the box, from where all of it is seen, as near as that allows.
@@ -123,6 +148,12 @@ impl Camera {
             let pick = |bit: usize, axis: usize| if k >> bit & 1 == 0 { low[axis] } else { high[axis] };
             DVec3::new(pick(0, 0), pick(1, 1), pick(2, 2)) - middle
         });
+        if camera.projection != Projection::Perspective {
+            return Err(Error::camera(
+                "only a pinhole camera can frame the scene by itself",
+                "give --eye and --look-at, or --camera",
+            ));
+        }
         // A corner at depth z nearer than the middle and x aside is seen from distance z + |x| / half width on.
         let distance = corners.fold(0.0, |distance: f64, corner| {
             let nearer = -corner.dot(camera.forward);
@@ -135,18 +166,77 @@ impl Camera {
         Ok(camera)
     }
 
-    /// Direction, not of unit length, through the place `x`, `y` in pixels from the upper left corner of the picture.
-    pub fn direction(&self, x: f64, y: f64) -> DVec3 {
+    /// Origin and direction of the ray through the place `x`, `y` in pixels from the upper left corner of the picture.
+    /// Distance along the direction is depth: along the view, in a panorama from the eye.
+    pub fn ray(&self, x: f64, y: f64) -> (DVec3, DVec3) {
         let across = (2.0 * x / f64::from(self.size[0]) - 1.0) * self.half[0];
         let upward = (1.0 - 2.0 * y / f64::from(self.size[1])) * self.half[1];
-        self.forward + across * self.right + upward * self.up
+        match self.projection {
+            Projection::Perspective => (self.eye, self.forward + across * self.right + upward * self.up),
+            Projection::Orthographic => (self.eye + across * self.right + upward * self.up, self.forward),
+            Projection::Panorama => {
+                let level = across.cos() * self.forward + across.sin() * self.right;
+                (self.eye, upward.cos() * level + upward.sin() * self.up)
+            }
+        }
+    }
+
+    /// The camera turned by an angle (radians) about the axis through `middle` along `axis`, as a scene on a turntable is seen.
+    pub fn turned(&self, middle: DVec3, axis: DVec3, angle: f64) -> Camera {
+        let turn = glam::DQuat::from_axis_angle(axis.normalize_or(DVec3::Y), angle);
+        Camera {
+            eye: middle + turn * (self.eye - middle),
+            forward: turn * self.forward,
+            right: turn * self.right,
+            up: turn * self.up,
+            ..self.clone()
+        }
+    }
+
+    /// Rotation and translation into the camera's space (x right, y up, looking along -z), for row vectors: p' = p M.
+    pub fn world_to_camera(&self) -> [[f64; 4]; 4] {
+        let axes = [self.right, self.up, -self.forward];
+        let row = |k: usize| [axes[0][k], axes[1][k], axes[2][k], 0.0];
+        let last = axes.map(|axis| -axis.dot(self.eye));
+        [row(0), row(1), row(2), [last[0], last[1], last[2], 1.0]]
+    }
+
+    /// World to picture, for row vectors: after division by w, x from -1 at the left to 1 and y from -1 at the bottom to 1; z
+    /// falls from 1 at the eye's plane's infinity, 1 - 1 / depth (perspective), or is the depth. None for a panorama.
+    pub fn world_to_ndc(&self) -> Option<[[f64; 4]; 4]> {
+        let project = |[x, y, z, w]: [f64; 4]| match self.projection {
+            Projection::Perspective => [x / self.half[0], y / self.half[1], -z - w, -z],
+            _ => [x / self.half[0], y / self.half[1], -z, w],
+        };
+        (self.projection != Projection::Panorama).then(|| self.world_to_camera().map(project))
+    }
+
+    /// Where a point of space appears, in pixels, and its depth; `None` at and behind the eye.
+    pub fn place_of(&self, point: DVec3) -> Option<([f64; 2], f64)> {
+        let v = point - self.eye;
+        let [x, y, depth] = [self.right, self.up, self.forward].map(|axis| axis.dot(v));
+        let (across, upward, depth) = match self.projection {
+            Projection::Perspective if depth > 0.0 => (x / depth, y / depth, depth),
+            Projection::Orthographic if depth > 0.0 => (x, y, depth),
+            Projection::Panorama => (x.atan2(depth), y.atan2(x.hypot(depth)), v.length()),
+            _ => return None,
+        };
+        let [width, height] = self.size.map(f64::from);
+        let place =
+            [0.5 * (1.0 + across / self.half[0]) * width, 0.5 * (1.0 - upward / self.half[1]) * height];
+        Some((place, depth))
     }
 
     /// The camera in one line of numbers that give their bits back.
     pub fn describe(&self) -> String {
         let vector = |v: DVec3| v.to_array().map(number).join(",");
         format!(
-            "eye={} forward={} up={} half_width={} half_height={} size={}x{}{}",
+            "{}eye={} forward={} up={} half_width={} half_height={} size={}x{}{}",
+            match self.projection {
+                Projection::Perspective => "",
+                Projection::Orthographic => "orthographic ",
+                Projection::Panorama => "panorama ",
+            },
             vector(self.eye),
             vector(self.forward),
             vector(self.up),
@@ -175,6 +265,15 @@ fn chosen<'a>(name: Option<&str>, described: &'a [CameraSettings]) -> Result<Opt
 }
 
 fn described_lens(described: &CameraSettings) -> Result<Lens> {
+    match described.projection {
+        ProjectionSettings::Orthographic => {
+            return described.view_height.map(Lens::Orthographic).ok_or_else(|| {
+                Error::camera("an orthographic camera has no view_height", "give it in the scene's unit")
+            });
+        }
+        ProjectionSettings::Equirectangular => return Ok(Lens::Panorama),
+        ProjectionSettings::Perspective => {}
+    }
     match (described.focal_length, described.film, described.fov_deg) {
         (Some(focal_length), Some([width, _]), None) => Ok(Lens::Film { focal_length, width }),
         (None, None, Some(fov_deg)) => Ok(Lens::Vertical(fov_deg)),
@@ -201,6 +300,8 @@ fn half_extent(lens: Lens, [width, height]: [u32; 2]) -> Result<[f64; 2]> {
             (half_height * aspect, half_height)
         }
         Lens::Vertical(_) => (f64::NAN, f64::NAN),
+        Lens::Orthographic(view_height) => (0.5 * view_height * aspect, 0.5 * view_height),
+        Lens::Panorama => (0.5 * TAU, 0.5 * PI),
     };
     if !(half_width > 0.0 && half_height > 0.0 && half_width.is_finite() && half_height.is_finite()) {
         return Err(Error::camera(
@@ -234,11 +335,11 @@ mod tests {
     #[test]
     fn middle_and_corners_of_the_cornell_picture() {
         let camera = cornell();
-        assert_eq!(camera.direction(128.0, 128.0), DVec3::Z);
+        assert_eq!(camera.ray(128.0, 128.0).1, DVec3::Z);
         // Half the film over the focal length, x to the left.
         let half = 0.0125 / 0.035;
-        assert!(camera.direction(0.0, 0.0).abs_diff_eq(DVec3::new(half, half, 1.0), 1e-15));
-        assert!(camera.direction(256.0, 256.0).abs_diff_eq(DVec3::new(-half, -half, 1.0), 1e-15));
+        assert!(camera.ray(0.0, 0.0).1.abs_diff_eq(DVec3::new(half, half, 1.0), 1e-15));
+        assert!(camera.ray(256.0, 256.0).1.abs_diff_eq(DVec3::new(-half, -half, 1.0), 1e-15));
     }
 
     /// Looking along +z with y up, right-handed, the red wall at x = 552 is on the left and the ceiling is above.
@@ -249,7 +350,7 @@ mod tests {
         assert!(x < 64.0 && (y - 128.0).abs() < 1e-9, "{x} {y}");
         let (_, y) = seen_at(&camera, DVec3::new(278.0, 548.0, 300.0));
         assert!(y < 64.0, "{y}");
-        let there = camera.direction(x, 128.0);
+        let (_, there) = camera.ray(x, 128.0);
         assert!(there.cross(DVec3::new(552.0 - 278.0, 0.0, 1100.0)).length() < 1e-9);
     }
 
@@ -298,6 +399,8 @@ mod tests {
             focal_length: None,
             film: None,
             fov_deg: Some(90.0),
+            projection: ProjectionSettings::Perspective,
+            view_height: None,
         };
         let both = [described("front", 1.0), described("side", 2.0)];
         let bounds = (DVec3::ZERO, DVec3::ONE);
@@ -322,5 +425,40 @@ mod tests {
         assert!(refused(Camera::new(eye, at, DVec3::Y, Lens::Vertical(180.0), [1, 1]), "field of view"));
         assert!(refused(Camera::new(DVec3::NAN, at, DVec3::Y, lens, [1, 1]), "finite"));
         assert!(refused(Camera::new(eye, at, DVec3::Y, lens, [0, 1]), "pixels"));
+    }
+
+    /// What a ray meets appears where the ray came from, in every projection, and the matrices agree.
+    #[test]
+    fn places_and_rays_are_inverse() {
+        let (eye, at, up) = (DVec3::new(1.0, 2.0, 3.0), DVec3::new(4.0, 1.0, 0.5), DVec3::new(0.1, 1.0, 0.0));
+        for lens in [Lens::Vertical(70.0), Lens::Orthographic(3.0), Lens::Panorama] {
+            let camera = Camera::new(eye, at, up, lens, [200, 100]).unwrap();
+            for (x, y, depth) in [(100.0, 50.0, 1.0), (3.0, 97.0, 0.5), (180.0, 12.5, 40.0)] {
+                let (origin, direction) = camera.ray(x, y);
+                let point = origin + depth * direction;
+                let (place, found) = camera.place_of(point).unwrap();
+                assert!((place[0] - x).abs() < 1e-9 && (place[1] - y).abs() < 1e-9, "{lens:?} {place:?}");
+                assert!((found - depth).abs() < 1e-9 * depth, "{found} {depth}");
+                let Some(matrix) = camera.world_to_ndc() else { continue };
+                let row = [point.x, point.y, point.z, 1.0];
+                let out: [f64; 4] = std::array::from_fn(|c| (0..4).map(|k| row[k] * matrix[k][c]).sum());
+                assert!((out[0] / out[3] - (x / 100.0 - 1.0)).abs() < 1e-9);
+                assert!((out[1] / out[3] - (1.0 - y / 50.0)).abs() < 1e-9);
+            }
+        }
+        let panorama = Camera::new(eye, at, up, Lens::Panorama, [200, 100]).unwrap();
+        assert!(panorama.ray(0.0, 50.0).1.abs_diff_eq(-panorama.forward, 1e-12));
+        assert!(panorama.ray(150.0, 50.0).1.abs_diff_eq(panorama.right, 1e-12));
+        assert!(panorama.ray(37.0, 0.0).1.abs_diff_eq(panorama.up, 1e-12));
+    }
+
+    #[test]
+    fn a_full_turn_comes_back_and_half_of_it_looks_from_the_other_side() {
+        let camera = cornell();
+        let middle = DVec3::new(278.0, 0.0, 280.0);
+        let half = camera.turned(middle, DVec3::Y, PI);
+        assert!(half.eye.abs_diff_eq(DVec3::new(278.0, 273.0, 1360.0), 1e-9), "{}", half.eye);
+        assert!(half.forward.abs_diff_eq(-camera.forward, 1e-12));
+        assert!(camera.turned(middle, DVec3::Y, TAU).eye.abs_diff_eq(camera.eye, 1e-9));
     }
 }

@@ -19,6 +19,14 @@ pub enum Error {
         /// What to do.
         remedy: String,
     },
+    /// A grid without points, or with too many.
+    #[error("grid: {found}; {remedy}")]
+    Grid {
+        /// What is wrong with it.
+        found: String,
+        /// What to do.
+        remedy: String,
+    },
     /// An EXR file that the decoder refuses.
     #[error("{}: not a readable OpenEXR file: {found}; remake it with shade-tool render", path.display())]
     Picture {
@@ -33,5 +41,10 @@ impl Error {
     /// A camera that sees nothing.
     pub fn camera(found: impl Into<String>, remedy: impl Into<String>) -> Error {
         Error::Camera { found: found.into(), remedy: remedy.into() }
+    }
+
+    /// A grid without points, or with too many.
+    pub fn grid(found: impl Into<String>, remedy: impl Into<String>) -> Error {
+        Error::Grid { found: found.into(), remedy: remedy.into() }
     }
 }

@@ -1,8 +1,11 @@
-//! Pictures as OpenEXR: linear RGB radiance with the primaries of Rec. 709, ZIP in blocks of 16 rows, half or float.
+//! Pictures as OpenEXR: linear RGB radiance with the primaries of Rec. 709 and layers by name (`albedo.R`), ZIP in blocks of 16
+//! rows, half or float; depth is always float, and indices are integers.
 //! The same picture gives the same bytes: no date, and never more than one attribute beyond the standard ones (the
 //! library keeps those in a hash map, whose order changes from run to run).
 
+use crate::camera::Camera;
 use crate::error::{Error, Result};
+use crate::layers::{Layer as PictureLayer, Values};
 use crate::picture::Picture;
 use exr::image::write::WritableImage;
 use exr::meta::attribute::{AttributeValue, Chromaticities, LineOrder, Text};
@@ -60,26 +63,49 @@ pub fn fit(picture: &Picture, precision: Precision) -> Fit {
     }
 }
 
+/// What a file says of its picture.
+#[derive(Debug)]
+pub struct Label<'a> {
+    /// What made it of what.
+    pub provenance: &'a Provenance,
+    /// Where it was seen from.
+    pub camera: Option<&'a Camera>,
+    /// Luminous efficacy, lm W^-1: white luminance is that of RGB 1, 1, 1.
+    pub efficacy: f64,
+    /// Result-dependent remarks, such as the achieved error.
+    pub remarks: String,
+}
+
 /// Writes the picture; an identical file is left alone.
-pub fn write(
-    path: &Path,
-    picture: &Picture,
-    precision: Precision,
-    provenance: &Provenance,
-) -> Result<Outcome> {
-    let channel = |name: &str, c: usize| {
-        let values = picture.pixels.iter().map(|pixel| pixel[c]);
-        let samples = match precision {
-            Precision::Half => FlatSamples::F16(values.map(f16::from_f64).collect()),
-            Precision::Float => FlatSamples::F32(values.map(|x| x as f32).collect()),
-        };
-        AnyChannel::new(text(name), samples)
+pub fn write(path: &Path, picture: &Picture, precision: Precision, label: &Label<'_>) -> Result<Outcome> {
+    let provenance = label.provenance;
+    let stored = |values: &mut dyn Iterator<Item = f64>, precision: Precision| match precision {
+        Precision::Half => FlatSamples::F16(values.map(f16::from_f64).collect()),
+        Precision::Float => FlatSamples::F32(values.map(|x| x as f32).collect()),
     };
-    let channels =
-        AnyChannels::sort([channel("R", 0), channel("G", 1), channel("B", 2)].into_iter().collect());
+    let mut list = Vec::new();
+    for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
+        list.push(AnyChannel::new(text(name), stored(&mut picture.pixels.iter().map(|p| p[c]), precision)));
+    }
+    for (layer, values) in &picture.layers {
+        // A half has 11 bits: depths of a millimetre in two metres.
+        let precision = if *layer == PictureLayer::Depth { Precision::Float } else { precision };
+        for (c, channel) in layer.channels().iter().enumerate() {
+            let samples = match values {
+                Values::Triples(values) => stored(&mut values.iter().map(|v| v[c]), precision),
+                Values::Numbers(values) => stored(&mut values.iter().copied(), precision),
+                Values::Indices(values) => FlatSamples::U32(values.clone()),
+            };
+            list.push(AnyChannel::new(text(&format!("{}.{channel}", layer.name())), samples));
+        }
+    }
+    let channels = AnyChannels::sort(list.into_iter().collect());
     let mut attributes = LayerAttributes {
         software_name: Some(text(&format!("{} {}", provenance.tool, provenance.version))),
-        comments: Some(text(COMMENTS)),
+        comments: Some(text(&format!("{COMMENTS}{}", label.remarks))),
+        white_luminance: Some(label.efficacy as f32),
+        world_to_camera: label.camera.map(|camera| flat(camera.world_to_camera())),
+        world_to_normalized_device: label.camera.and_then(Camera::world_to_ndc).map(flat),
         ..LayerAttributes::default()
     };
     attributes.other.insert(text(PROVENANCE), AttributeValue::Text(text(&provenance_json(provenance))));
@@ -99,6 +125,11 @@ pub fn write(
         })
     });
     outcome.map_err(Error::from)
+}
+
+/// Row by row, as files hold matrices.
+fn flat(matrix: [[f64; 4]; 4]) -> [f32; 16] {
+    std::array::from_fn(|k| matrix[k / 4][k % 4] as f32)
 }
 
 /// UTF-8 bytes as they are; the library itself would take Latin letters only.
@@ -128,11 +159,48 @@ mod tests {
     fn picture() -> Picture {
         let pixels =
             (0..20 * 37).map(|i| [f64::from(i), 0.1 * f64::from(i), 1.0 / (1.0 + f64::from(i))]).collect();
-        Picture { width: 37, height: 20, pixels }
+        Picture { width: 37, height: 20, pixels, ..Picture::default() }
     }
 
     fn provenance() -> Provenance {
         Provenance::new("shade-tool", "9.9").flag("--samples 2").flag("ü").input("mesh", Digest::of(b"abc"))
+    }
+
+    fn label(provenance: &Provenance) -> Label<'_> {
+        Label { provenance, camera: None, efficacy: 179.0, remarks: String::new() }
+    }
+
+    #[test]
+    fn layers_and_camera_come_back_by_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("p.exr");
+        let mut picture = picture();
+        let count = picture.pixels.len();
+        picture.layers = vec![
+            (PictureLayer::Albedo, Values::Triples(vec![[0.5, 0.25, 0.125]; count])),
+            (PictureLayer::Depth, Values::Numbers(vec![1000.5; count])),
+            (PictureLayer::Element, Values::Indices((0..count as u32).collect())),
+        ];
+        let (eye, at) = (glam::DVec3::ZERO, glam::DVec3::Z);
+        let camera =
+            Camera::new(eye, at, glam::DVec3::Y, crate::camera::Lens::Vertical(90.0), [37, 20]).unwrap();
+        let provenance = provenance();
+        let label = Label { camera: Some(&camera), ..label(&provenance) };
+        write(&path, &picture, Precision::Half, &label).unwrap();
+        let read = exr::image::read::read_all_flat_layers_from_file(&path).unwrap();
+        let layer = &read.layer_data[0];
+        let channel = |name: &str| {
+            let found = layer.channel_data.list.iter().find(|c| c.name == text(name)).unwrap();
+            found.sample_data.clone()
+        };
+        assert_eq!(channel("albedo.B").values_as_f32().next(), Some(0.125));
+        assert!(matches!(channel("depth.Z"), FlatSamples::F32(values) if values[3] == 1000.5));
+        assert!(matches!(channel("element.id"), FlatSamples::U32(values) if values[9] == 9));
+        assert_eq!(layer.attributes.white_luminance, Some(179.0));
+        let to_camera = layer.attributes.world_to_camera.unwrap();
+        // Looking along +z with y up, right is -x.
+        assert_eq!((to_camera[0], to_camera[5], to_camera[10], to_camera[15]), (-1.0, 1.0, -1.0, 1.0));
+        assert!(layer.attributes.world_to_normalized_device.is_some());
     }
 
     #[test]
@@ -140,7 +208,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("p.exr");
         for (precision, tolerance) in [(Precision::Half, 5e-4), (Precision::Float, 6e-8)] {
-            write(&path, &picture(), precision, &provenance()).unwrap();
+            write(&path, &picture(), precision, &label(&provenance())).unwrap();
             let read = exr::image::read::read_all_flat_layers_from_file(&path).unwrap();
             assert_eq!(read.attributes.chromaticities.unwrap().red, Vec2(0.64, 0.33));
             let layer = &read.layer_data[0];
@@ -164,10 +232,13 @@ mod tests {
     fn same_picture_gives_the_same_bytes_and_leaves_the_file_alone() {
         let folder = tempfile::tempdir().unwrap();
         let (one, two) = (folder.path().join("1.exr"), folder.path().join("2.exr"));
-        write(&one, &picture(), Precision::Half, &provenance()).unwrap();
-        write(&two, &picture(), Precision::Half, &provenance()).unwrap();
+        write(&one, &picture(), Precision::Half, &label(&provenance())).unwrap();
+        write(&two, &picture(), Precision::Half, &label(&provenance())).unwrap();
         assert_eq!(std::fs::read(&one).unwrap(), std::fs::read(&two).unwrap());
-        assert_eq!(write(&one, &picture(), Precision::Half, &provenance()).unwrap(), Outcome::Unchanged);
+        assert_eq!(
+            write(&one, &picture(), Precision::Half, &label(&provenance())).unwrap(),
+            Outcome::Unchanged
+        );
     }
 
     #[test]
@@ -178,7 +249,7 @@ mod tests {
             ([0.1, 1e-6, 0.0], Fit::Good),
             ([0.0, 0.0, 0.0], Fit::Good),
         ] {
-            let picture = Picture { width: 1, height: 1, pixels: vec![pixel] };
+            let picture = Picture { width: 1, height: 1, pixels: vec![pixel], ..Picture::default() };
             assert_eq!(fit(&picture, Precision::Half), half, "{pixel:?}");
             assert_eq!(fit(&picture, Precision::Float), Fit::Good, "{pixel:?}");
         }

@@ -1,5 +1,5 @@
-//! The mesh as it is drawn: every six-node triangle as four triangles between its corners and mid-edge nodes, so that
-//! interpolation is linear over half the element's size at the cost of gathering only; the solution keeps its elements.
+//! The mesh as it is drawn. Interpolation may want smaller or simpler pieces than the solution has; nodes are
+//! gathered where they are wanted, and the solution keeps its elements.
 
 use interchange::ids::{NodeId, VertexId};
 use interchange::mesh::{Cluster, Mesh};
@@ -9,8 +9,19 @@ use interchange::ragged::Ragged;
 /// 0-1, 1-2 and 2-0.
 const FACETS: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]];
 
-/// The mesh with its six-node triangles cut into facets; elements without mid-edge nodes stay as they are.
-pub fn drawn_mesh(mesh: &Mesh) -> Mesh {
+/// What is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Drawn {
+    /// The elements that were solved.
+    Elements,
+    /// Every six-node triangle as four triangles between its corners and mid-edge nodes: linear over half the size.
+    Facets,
+    /// Every polygon as a fan of triangles: curved interpolation cuts them where it must.
+    Triangles,
+}
+
+/// The mesh as it is drawn, and the element each of its facets comes from.
+pub fn drawn_mesh(mesh: &Mesh, how: Drawn) -> (Mesh, Vec<u32>) {
     let mut drawn = Mesh {
         elements: Ragged::default(),
         element_nodes: Ragged::default(),
@@ -19,18 +30,23 @@ pub fn drawn_mesh(mesh: &Mesh) -> Mesh {
         clusters: Vec::new(),
         ..mesh.clone()
     };
+    let mut source_of = Vec::new();
     for (k, (corners, nodes)) in mesh.elements.rows().zip(mesh.element_nodes.rows()).enumerate() {
-        let six = corners.len() == 3 && nodes.len() == 6;
         let mut push = |corners: Vec<VertexId>, nodes: Vec<NodeId>| {
             drawn.elements.push(corners);
             drawn.element_nodes.push(nodes);
             drawn.element_faces.push(mesh.element_faces[k]);
             drawn.element_sides.push(mesh.element_sides[k]);
+            source_of.push(k as u32);
         };
-        if six {
+        if how == Drawn::Facets && corners.len() == 3 && nodes.len() == 6 {
             for facet in FACETS {
                 let nodes = facet.map(|n| nodes[n]);
                 push(nodes.map(|node| mesh.node_vertices[node.index()]).to_vec(), nodes.to_vec());
+            }
+        } else if how == Drawn::Triangles {
+            for c in 2..corners.len() {
+                push(vec![corners[0], corners[c - 1], corners[c]], vec![nodes[0], nodes[c - 1], nodes[c]]);
             }
         } else {
             push(corners.to_vec(), nodes[..corners.len()].to_vec());
@@ -38,7 +54,7 @@ pub fn drawn_mesh(mesh: &Mesh) -> Mesh {
     }
     let end = drawn.elements.len() as u32;
     drawn.clusters.push(Cluster { start: 0, end, first_child: 0, second_child: 0 });
-    drawn
+    (drawn, source_of)
 }
 
 #[cfg(test)]
@@ -59,11 +75,24 @@ mod tests {
         mesh.node_vertices = ids.iter().map(|&v| VertexId(v)).collect();
         mesh.element_faces.push(FaceId(0));
         mesh.element_sides.push(0);
-        let drawn = drawn_mesh(&mesh);
-        assert_eq!(drawn.element_count(), 4);
+        let (drawn, source_of) = drawn_mesh(&mesh, Drawn::Facets);
+        assert_eq!((drawn.element_count(), source_of), (4, vec![0; 4]));
         for facet in drawn.element_ids() {
             assert_eq!(polygon::vector_area(&drawn.element_corners(facet)), DVec3::new(0.0, 0.0, 1.0));
         }
         assert_eq!(drawn.element_corners(ElementId(3))[1], DVec3::new(1.0, 2.0, 0.0));
+    }
+
+    #[test]
+    fn polygons_become_fans_and_elements_stay() {
+        let mut mesh = Mesh { vertices: vec![[0.0; 3]; 5], ..Mesh::default() };
+        mesh.elements.push((0..5).map(VertexId));
+        mesh.element_nodes.push((0..5).map(NodeId));
+        mesh.element_faces.push(FaceId(0));
+        mesh.element_sides.push(0);
+        let (fan, source_of) = drawn_mesh(&mesh, Drawn::Triangles);
+        let corners: Vec<u32> = fan.elements.values().iter().map(|v| v.0).collect();
+        assert_eq!((corners, source_of), (vec![0, 1, 2, 0, 2, 3, 0, 3, 4], vec![0; 3]));
+        assert_eq!(drawn_mesh(&mesh, Drawn::Elements).0.elements, mesh.elements);
     }
 }

@@ -177,13 +177,22 @@ mod tests {
     use crate::picture::Picture;
     use interchange::provenance::Provenance;
 
+    fn label(provenance: &Provenance) -> exr_file::Label<'_> {
+        exr_file::Label { provenance, camera: None, efficacy: 179.0, remarks: String::new() }
+    }
+
     #[test]
     fn picture_tells_size_ranges_and_provenance() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("p.exr");
-        let picture = Picture { width: 2, height: 1, pixels: vec![[0.0, 0.5, 1.0], [2.0, 0.25, 1e9]] };
+        let picture = Picture {
+            width: 2,
+            height: 1,
+            pixels: vec![[0.0, 0.5, 1.0], [2.0, 0.25, 1e9]],
+            ..Picture::default()
+        };
         let provenance = Provenance::new("shade-tool", "1.2").flag("--samples 4");
-        exr_file::write(&path, &picture, Precision::Half, &provenance).unwrap();
+        exr_file::write(&path, &picture, Precision::Half, &label(&provenance)).unwrap();
         let info = read(&path).unwrap();
         assert_eq!(info.layers[0].size, [2, 1]);
         let names: Vec<&str> = info.layers[0].channels.iter().map(|c| c.name.as_str()).collect();
@@ -206,8 +215,9 @@ mod tests {
             assert!(read(&path).unwrap_err().to_string().contains(word));
         }
         let path = folder.path().join("cut.exr");
-        let picture = Picture { width: 9, height: 40, pixels: vec![[1.0, 2.0, 0.1]; 360] };
-        exr_file::write(&path, &picture, Precision::Float, &Provenance::new("t", "1")).unwrap();
+        let picture =
+            Picture { width: 9, height: 40, pixels: vec![[1.0, 2.0, 0.1]; 360], ..Picture::default() };
+        exr_file::write(&path, &picture, Precision::Float, &label(&Provenance::new("t", "1"))).unwrap();
         let whole = std::fs::read(&path).unwrap();
         for length in [4, 5, 100, whole.len() / 2, whole.len() - 1] {
             std::fs::write(&path, &whole[..length]).unwrap();

@@ -31,6 +31,14 @@ pub fn corner_weights(corners: &[DVec2], point: DVec2, weights: &mut Vec<f64>) {
     weights.iter_mut().for_each(|weight| *weight /= sum);
 }
 
+/// Weights of a triangle's six nodes, three corners and the middles of edges 0-1, 1-2 and 2-0, at the point where
+/// `areal` are its areal coordinates: the quadratic that is 1 at its node and 0 at the others.
+pub fn quadratic_weights(areal: &[f64]) -> [f64; 6] {
+    let corner = |k: usize| areal[k] * (2.0 * areal[k] - 1.0);
+    let middle = |k: usize| 4.0 * areal[k] * areal[(k + 1) % 3];
+    [corner(0), corner(1), corner(2), middle(0), middle(1), middle(2)]
+}
+
 /// Where the point is on an edge or outside of it: weights along that edge.
 fn on_border(corners: &[DVec2], point: DVec2, weights: &mut [f64]) -> bool {
     let n = corners.len();
@@ -117,6 +125,17 @@ mod tests {
                     assert!((weights[(k + 1) % n] - 0.3).abs() < 1e-5);
                 }
             }
+        }
+    }
+
+    #[test]
+    fn six_nodes_reproduce_quadratics() {
+        let f = |x: f64, y: f64| 1.0 + 2.0 * x - y + 3.0 * x * x - x * y + 0.5 * y * y;
+        let nodes = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5)];
+        for (x, y) in [(0.2, 0.3), (0.0, 0.7), (1.0 / 3.0, 1.0 / 3.0), (0.5, 0.0)] {
+            let weights = quadratic_weights(&[1.0 - x - y, x, y]);
+            let got: f64 = weights.iter().zip(nodes).map(|(w, (x, y))| w * f(x, y)).sum();
+            assert!((got - f(x, y)).abs() < 1e-14, "{got}");
         }
     }
 

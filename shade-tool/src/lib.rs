@@ -1,10 +1,10 @@
 //! Radiosity to pictures and points: the last stage of the pipeline.
 //!
 //! [`render`] finds the surface that each sample of a pixel sees ([`visible`]), gathers irradiance at the nodes of the
-//! facets that are seen ([`facets`], [`nodes`], [`node_places`]), cuts facets over which radiosity is not linear ([`refined`]), interpolates linearly
-//! ([`interpolation`]) and writes
-//! radiance as OpenEXR ([`exr_file`]) and a tone-mapped preview ([`preview`]). [`probe`] gathers irradiance at the
-//! points of a table. [`info`] tells what a picture holds.
+//! facets that are seen ([`facets`], [`nodes`], [`node_places`]), cuts facets where interpolation is not good enough ([`refined`]),
+//! interpolates ([`interpolation`]) and writes radiance and layers ([`layers`]) as OpenEXR ([`exr_file`]) and a tone-mapped
+//! preview ([`preview`]), for one camera or several ([`camera`], [`frames`]). [`probe`] gathers irradiance at the points of a
+//! table or of a grid ([`grid`]). [`info`] tells what a picture holds. [`skips`] names what is left out.
 //!
 //! # Limitations
 //! Surfaces are seen as Lambertian: specular and transparent parts of a material do not show.
@@ -12,14 +12,18 @@
 #![forbid(unsafe_code)]
 
 pub mod camera;
+pub mod coarser;
 pub mod command_line;
 pub mod convex;
 pub mod error;
 pub mod exr_file;
 pub mod face_elements;
 pub mod facets;
+pub mod frames;
+pub mod grid;
 pub mod info;
 pub mod interpolation;
+pub mod layers;
 pub mod lit_scene;
 pub mod node_places;
 pub mod nodes;
@@ -31,6 +35,7 @@ pub mod probe;
 pub mod receiver;
 pub mod refined;
 pub mod render;
+pub mod skips;
 pub mod visible;
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Mesh, solution and materials read together and checked against each other.
 
 use crate::error::Result;
-use crate::facets::drawn_mesh;
+use crate::facets::{Drawn, drawn_mesh};
 use glam::DVec3;
 use interchange::digest::Digest;
 use interchange::ids::{ElementId, FaceId};
@@ -20,8 +20,14 @@ pub struct LitScene {
     pub mesh: Mesh,
     /// Corners of the elements that were solved.
     pub sources: Vec<Vec<DVec3>>,
+    /// Source that each drawn facet is all or part of.
+    pub source_of: Vec<u32>,
     /// Radiosity of every source, RGB, W m^-2.
     pub radiosity: Vec<[f64; 3]>,
+    /// Irradiance of every source as solved, RGB, W m^-2.
+    pub irradiance: Vec<[f64; 3]>,
+    /// Bound that the solver reached, part of the emitted power.
+    pub achieved: f64,
     /// Materials in the mesh's order.
     pub materials: Vec<Material>,
     /// Identities of solution, mesh and materials, with their roles.
@@ -35,6 +41,7 @@ impl LitScene {
         solution_path: &Path,
         mesh_path: &Path,
         materials_path: Option<&Path>,
+        drawn: Drawn,
         report: &mut Report,
     ) -> Result<LitScene> {
         let (mesh, _, mesh_digest) = Mesh::read(mesh_path)?;
@@ -59,8 +66,10 @@ impl LitScene {
         let inputs =
             vec![("solution", solution_digest), ("mesh", mesh_digest), ("materials", materials_digest)];
         let sources = mesh.element_ids().map(|element| mesh.element_corners(element)).collect();
-        let mesh = drawn_mesh(&mesh);
-        Ok(LitScene { mesh, sources, radiosity: solution.radiosity, materials, inputs })
+        let (mesh, source_of) = drawn_mesh(&mesh, drawn);
+        let Solution { radiosity, irradiance, summary, .. } = solution;
+        let achieved = summary.achieved;
+        Ok(LitScene { mesh, sources, source_of, radiosity, irradiance, achieved, materials, inputs })
     }
 
     /// Adds the inputs to a provenance.

@@ -1,11 +1,12 @@
-//! Radiosity at the nodes that a picture needs: B = E + rho H, with H gathered exactly at the node instead of
-//! averaged from the elements around it; and the linear interpolation between them.
+//! Irradiance at the nodes that a picture needs, gathered at the node instead of averaged from the elements around it; and
+//! the linear interpolation between them. Radiosity is B = E + rho H.
 
 use crate::lit_scene::LitScene;
 use crate::node_places::{NodePlace, NodePlaces, corner_nodes};
-use crate::receiver::{Light, Receiver};
+use crate::receiver::{Light, Parts, Receiver, total};
 use crate::refined::Corner;
 use geometry::gather::Scratch;
+use geometry::source_tree::Opening;
 use glam::DVec3;
 use interchange::ids::{ElementId, NodeId, VertexId};
 use rayon::prelude::*;
@@ -15,7 +16,7 @@ use std::collections::HashMap;
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum State {
     Unknown,
-    Whole([f64; 3]),
+    Whole(Parts),
     /// One value per edge of its elements.
     Split,
 }
@@ -23,15 +24,15 @@ enum State {
 /// An edge of an element, seen from the node at its start.
 type NodeEdge = (NodeId, VertexId);
 
-/// Radiosity of the nodes gathered so far.
+/// Irradiance at the nodes gathered so far.
 #[derive(Debug)]
 pub struct NodeRadiosity<'a> {
     scene: &'a LitScene,
-    light: Light<'a>,
+    light: Light,
     places: NodePlaces<'a>,
     states: Vec<State>,
     /// Values of split nodes. Only looked up, never listed: its order is nobody's.
-    on_edges: HashMap<NodeEdge, [f64; 3]>,
+    on_edges: HashMap<NodeEdge, Parts>,
     /// What was done.
     pub counts: Counts,
 }
@@ -43,7 +44,7 @@ pub struct Ends {
     pub ids: [u32; 3],
     /// Places.
     pub points: [DVec3; 3],
-    /// Radiosity.
+    /// Irradiance.
     pub corners: [Corner; 3],
 }
 
@@ -64,11 +65,11 @@ pub struct Counts {
 
 impl<'a> NodeRadiosity<'a> {
     /// No node gathered yet.
-    pub fn new(scene: &'a LitScene) -> NodeRadiosity<'a> {
+    pub fn new(scene: &'a LitScene, opening: Opening) -> NodeRadiosity<'a> {
         let nodes = scene.mesh.node_vertices.len();
         NodeRadiosity {
             scene,
-            light: Light::new(scene),
+            light: Light::new(scene, opening),
             places: NodePlaces::new(scene),
             states: vec![State::Unknown; nodes],
             on_edges: HashMap::new(),
@@ -94,9 +95,8 @@ impl<'a> NodeRadiosity<'a> {
             match (place, reflecting) {
                 (_, Some(place)) if place.split => self.states[node.index()] = State::Split,
                 (_, Some(place)) => whole.push((node, place.element, place.receiver)),
-                (place, None) => {
-                    let exitance = place.map(|p| self.scene.material(p.element).exitance());
-                    self.states[node.index()] = State::Whole(exitance.unwrap_or_default());
+                (_, None) => {
+                    self.states[node.index()] = State::Whole(Parts::default());
                     self.counts.black += 1;
                 }
             }
@@ -108,17 +108,17 @@ impl<'a> NodeRadiosity<'a> {
         begin(whole.len() + edges.len());
         let this = &*self;
         let gathered = |scratch: &mut Scratch, element: ElementId, receiver: &Receiver| {
-            let radiosity = this.gathered(element, receiver, scratch);
+            let irradiance = this.gathered(element, receiver, scratch);
             done();
-            radiosity
+            irradiance
         };
-        let at_nodes: Vec<[f64; 3]> = whole
+        let at_nodes: Vec<Parts> = whole
             .par_iter()
             .map_init(Scratch::default, |scratch, (_, element, receiver)| {
                 gathered(scratch, *element, receiver)
             })
             .collect();
-        let at_edges: Vec<[f64; 3]> = edges
+        let at_edges: Vec<Parts> = edges
             .par_iter()
             .map_init(Scratch::default, |scratch, (_, element, receiver)| {
                 gathered(scratch, *element, receiver)
@@ -126,8 +126,8 @@ impl<'a> NodeRadiosity<'a> {
             .collect();
 
         // Keep.
-        for ((node, ..), radiosity) in whole.iter().zip(at_nodes) {
-            self.states[node.index()] = State::Whole(radiosity);
+        for ((node, ..), irradiance) in whole.iter().zip(at_nodes) {
+            self.states[node.index()] = State::Whole(irradiance);
         }
         self.on_edges.extend(edges.iter().map(|(edge, ..)| *edge).zip(at_edges));
         self.counts.whole += whole.len();
@@ -135,11 +135,21 @@ impl<'a> NodeRadiosity<'a> {
         self.counts.edges += edges.len();
     }
 
-    /// Radiosity of the element's material at a receiver: B = E + rho H.
-    pub fn gathered(&self, element: ElementId, receiver: &Receiver, scratch: &mut Scratch) -> [f64; 3] {
-        let (material, irradiance) = (self.scene.material(element), self.light.irradiance(receiver, scratch));
+    /// Irradiance at a receiver on an element, none where the element's material reflects nothing.
+    pub fn gathered(&self, element: ElementId, receiver: &Receiver, scratch: &mut Scratch) -> Parts {
+        if self.reflects(element) { self.light.irradiance(receiver, scratch) } else { Parts::default() }
+    }
+
+    /// Radiosity of the element's material under an irradiance: B = E + rho H.
+    pub fn radiosity(&self, element: ElementId, irradiance: &Parts) -> [f64; 3] {
+        let (material, irradiance) = (self.scene.material(element), total(irradiance));
         let exitance = material.exitance();
         std::array::from_fn(|c| exitance[c] + material.diffuse[c] * irradiance[c])
+    }
+
+    /// The sources, for their counters.
+    pub fn light(&self) -> &Light {
+        &self.light
     }
 
     /// Whether the element's material reflects anything.
@@ -197,17 +207,17 @@ impl<'a> NodeRadiosity<'a> {
         (corner_nodes(self.scene, element), self.scene.mesh.elements.row(element.index()))
     }
 
-    /// Radiosity within an element at the point where its corners weigh `weights`, RGB, W m^-2; its nodes must have been
+    /// Irradiance within an element at the point where its corners weigh `weights`; its nodes must have been
     /// gathered.
     ///
     /// The value of a split node is itself interpolated between those on the two edges of the element, as if the corner
     /// were an edge of length zero; so elements agree along the edges they share, and within each the value turns with the
     /// direction from the corner.
-    pub fn interpolate(&self, element: ElementId, weights: &[f64]) -> [f64; 3] {
+    pub fn interpolate(&self, element: ElementId, weights: &[f64]) -> Parts {
         let (nodes, corners) = self.corners(element);
-        let mut radiosity = [0.0; 3];
-        let mut add = |weight: f64, value: [f64; 3]| {
-            for (sum, b) in radiosity.iter_mut().zip(value) {
+        let mut irradiance = Parts::default();
+        let mut add = |weight: f64, value: Parts| {
+            for (sum, b) in irradiance.iter_mut().zip(value) {
                 *sum += weight * b;
             }
         };
@@ -225,7 +235,7 @@ impl<'a> NodeRadiosity<'a> {
                 State::Unknown => debug_assert!(false, "node {node:?} was not gathered"),
             }
         }
-        radiosity
+        irradiance
     }
 }
 
@@ -249,7 +259,7 @@ mod tests {
     }
 
     fn gathered(scene: &LitScene) -> NodeRadiosity<'_> {
-        let mut nodes = NodeRadiosity::new(scene);
+        let mut nodes = NodeRadiosity::new(scene, Opening::EXACT);
         let all: Vec<ElementId> = scene.mesh.element_ids().collect();
         nodes.gather(&all, |_| {}, || {});
         nodes
@@ -265,7 +275,8 @@ mod tests {
             for element in scene.mesh.element_ids() {
                 for weights in [corner(0), corner(1), corner(2), corner(3), [0.4, 0.3, 0.2, 0.1]] {
                     let want = [0.5 + 0.5, 0.25 * 2.0, 3.0];
-                    for (got, want) in nodes.interpolate(element, &weights).iter().zip(want) {
+                    let got = nodes.radiosity(element, &nodes.interpolate(element, &weights));
+                    for (got, want) in got.iter().zip(want) {
                         assert!((got - want).abs() < 1e-9, "{element:?} of {n}: {got}, want {want}");
                     }
                 }
@@ -286,7 +297,7 @@ mod tests {
         scene.radiosity[2] = [1.0; 3];
         scene.materials[0].diffuse = [1.0; 3];
         scene.materials[0].radiance = [0.0; 3];
-        let mut nodes = NodeRadiosity::new(&scene);
+        let mut nodes = NodeRadiosity::new(&scene, Opening::EXACT);
         let floor = ElementId(0);
         nodes.gather(&[floor], |points| assert_eq!(points, 8), || {});
         // Floor corners in x and z: (0, 0), (0, 1), (1, 1), (1, 0). The far ones see the wall of the unit cube with
@@ -301,7 +312,7 @@ mod tests {
             ([0.0, 0.0, 1.0, 0.0], far),
             ([0.0, 0.0, 0.0, 1.0], far),
         ] {
-            let got = nodes.interpolate(floor, &weights)[0];
+            let got = total(&nodes.interpolate(floor, &weights))[0];
             // The distance along the edge, 1e-4, with its logarithm.
             assert!((got - want).abs() < 1e-3, "{weights:?}: {got}, want {want}");
         }
@@ -332,8 +343,8 @@ mod tests {
             assert_eq!(first, second, "at {t} of the diagonal");
         }
         // Near the corner the diagonal is not what the edges beside it are.
-        let beside = nodes.interpolate(ElementId(0), &[1.0 - 1e-9, 1e-9, 0.0]);
-        let diagonal = nodes.interpolate(ElementId(0), &[1.0 - 1e-9, 0.0, 1e-9]);
+        let beside = total(&nodes.interpolate(ElementId(0), &[1.0 - 1e-9, 1e-9, 0.0]));
+        let diagonal = total(&nodes.interpolate(ElementId(0), &[1.0 - 1e-9, 0.0, 1e-9]));
         assert!((beside[0] - diagonal[0]).abs() > 0.1, "{beside:?} and {diagonal:?}");
     }
 
@@ -341,10 +352,11 @@ mod tests {
     fn black_materials_are_not_gathered() {
         let mut scene = furnace(1);
         scene.materials[0].diffuse = [0.0; 3];
-        let mut nodes = NodeRadiosity::new(&scene);
+        let mut nodes = NodeRadiosity::new(&scene, Opening::EXACT);
         nodes.gather(&[ElementId(3), ElementId(3)], |points| assert_eq!(points, 0), || {});
         nodes.gather(&[ElementId(3)], |points| assert_eq!(points, 0), || {});
         assert_eq!(nodes.counts, Counts { black: 4, unseen: 20, ..Counts::default() });
-        assert_eq!(nodes.interpolate(ElementId(3), &[0.25; 4]), [0.5, 0.0, 0.0]);
+        let dark = nodes.interpolate(ElementId(3), &[0.25; 4]);
+        assert_eq!(nodes.radiosity(ElementId(3), &dark), [0.5, 0.0, 0.0]);
     }
 }

@@ -1,12 +1,14 @@
-//! A picture in memory: linear RGB radiance, row 0 at the top.
+//! A picture in memory: linear RGB radiance and layers beside it, row 0 at the top.
+
+use crate::layers::{Layer, Values};
 
 /// Luminance of linear RGB with the primaries of Rec. 709.
 pub fn luminance(rgb: [f64; 3]) -> f64 {
     0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2]
 }
 
-/// Linear RGB pixels, W m^-2 sr^-1.
-#[derive(Debug, Clone, PartialEq)]
+/// Linear RGB pixels, W m^-2 sr^-1, and what else was asked for.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Picture {
     /// Width in pixels.
     pub width: usize,
@@ -14,6 +16,8 @@ pub struct Picture {
     pub height: usize,
     /// Row after row from the top, each from the left.
     pub pixels: Vec<[f64; 3]>,
+    /// Layers, each as large as the picture, in the order of their names.
+    pub layers: Vec<(Layer, Values)>,
 }
 
 impl Picture {
@@ -26,5 +30,10 @@ impl Picture {
     /// Largest value of any channel.
     pub fn highest(&self) -> f64 {
         self.pixels.iter().flatten().fold(0.0, |highest: f64, &x| highest.max(x))
+    }
+
+    /// Values of a layer, if it was made.
+    pub fn layer(&self, layer: Layer) -> Option<&Values> {
+        self.layers.iter().find(|(found, _)| *found == layer).map(|(_, values)| values)
     }
 }

@@ -75,7 +75,12 @@ mod tests {
     use super::*;
 
     fn grey(values: &[f64]) -> Picture {
-        Picture { width: values.len(), height: 1, pixels: values.iter().map(|&x| [x; 3]).collect() }
+        Picture {
+            width: values.len(),
+            height: 1,
+            pixels: values.iter().map(|&x| [x; 3]).collect(),
+            ..Picture::default()
+        }
     }
 
     #[test]

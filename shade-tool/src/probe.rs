@@ -1,13 +1,15 @@
 //! Irradiance at points given by the user, on a surface or anywhere.
 
+use crate::coarser::coarser_radiosity;
 use crate::error::Result;
 use crate::lit_scene::LitScene;
 use crate::on_surface::Surfaces;
 use crate::points::{COLUMNS, ProbePoint};
 use crate::receiver::Light;
 use geometry::gather::Scratch;
+use geometry::source_tree::Opening;
 use interchange::report::Report;
-use interchange::tables::{number, write_csv};
+use interchange::tables::{TableFormat, number, write_csv, write_npy};
 use interchange::tool::Common;
 use rayon::prelude::*;
 use std::path::Path;
@@ -15,9 +17,28 @@ use std::path::Path;
 /// Columns added to those of the points.
 pub const ADDED: [&str; 3] = ["H_r", "H_g", "H_b"];
 
-/// Irradiance at every point, RGB, W m^-2, and counters in the report.
-pub fn probe(scene: &LitScene, points: &[ProbePoint], common: &Common, report: &mut Report) -> Vec<[f64; 3]> {
-    let (surfaces, light) = report.phase("gatherer", || (Surfaces::new(scene), Light::new(scene)));
+/// Column of the estimated error, where asked for.
+pub const ERROR: &str = "H_error";
+
+/// What was found at a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Probed {
+    /// Irradiance, RGB, W m^-2.
+    pub irradiance: [f64; 3],
+    /// Its estimated error, worst channel, W m^-2: by the elements' size and by the solver's stop. Errors of the matrix are
+    /// the solution's own report.
+    pub error: f64,
+}
+
+/// Irradiance at every point, and counters in the report.
+pub fn probe(
+    scene: &LitScene,
+    points: &[ProbePoint],
+    opening: Opening,
+    common: &Common,
+    report: &mut Report,
+) -> Vec<Probed> {
+    let (surfaces, light) = report.phase("gatherer", || (Surfaces::new(scene), light(scene, opening)));
     let receivers: Vec<_> = report.phase("find faces", || {
         points.par_iter().map(|point| surfaces.receiver(point.point, point.normal)).collect()
     });
@@ -25,29 +46,68 @@ pub fn probe(scene: &LitScene, points: &[ProbePoint], common: &Common, report: &
     report.count("points_on_faces", receivers.iter().filter(|(r, _)| r.face.is_some()).count());
     report.count("points_moved_inward", receivers.iter().filter(|(_, moved)| *moved).count());
     let bar = common.progress("probe", points.len());
-    let irradiance: Vec<[f64; 3]> = report.phase("gather", || {
+    let solver_error = scene.achieved * mean_exitance(scene);
+    let probed: Vec<Probed> = report.phase("gather", || {
         receivers
             .par_iter()
             .map_init(Scratch::default, |scratch, (receiver, _)| {
-                let irradiance = light.irradiance(receiver, scratch);
+                let both = light.irradiance(receiver, scratch);
                 bar.inc(1);
-                irradiance
+                let by_size = (0..3).fold(0.0, |most: f64, c| most.max((both[c] - both[c + 3]).abs()));
+                Probed { irradiance: [both[0], both[1], both[2]], error: by_size + solver_error }
             })
             .collect()
     });
     bar.finish_and_clear();
+    light.count(report);
     for (c, name) in ADDED.iter().enumerate().filter(|_| !points.is_empty()) {
-        let mean = irradiance.iter().map(|h| h[c]).sum::<f64>() / points.len() as f64;
+        let mean = probed.iter().map(|p| p.irradiance[c]).sum::<f64>() / points.len() as f64;
         report.estimate(&format!("mean_{name}"), mean);
     }
-    irradiance
+    if !probed.is_empty() {
+        report.estimate("largest_H_error", probed.iter().fold(0.0, |most, p| most.max(p.error)));
+    }
+    probed
 }
 
-/// Writes the points as they were given, and irradiance behind each.
-pub fn write(path: &Path, points: &[ProbePoint], irradiance: &[[f64; 3]]) -> Result<()> {
-    let header: Vec<String> = COLUMNS.iter().chain(&ADDED).map(|&name| name.into()).collect();
-    let rows = points.iter().zip(irradiance).map(|(point, irradiance)| {
-        point.fields.iter().cloned().chain(irradiance.iter().map(|&x| number(x))).collect()
+/// The solution's radiosity, and that of a coarser one.
+fn light(scene: &LitScene, opening: Opening) -> Light {
+    let coarse = coarser_radiosity(scene);
+    let both =
+        |(fine, coarse): (&[f64; 3], &[f64; 3])| [fine[0], fine[1], fine[2], coarse[0], coarse[1], coarse[2]];
+    let strengths: Vec<[f64; 6]> = scene.radiosity.iter().zip(&coarse).map(both).collect();
+    Light::with_strengths(scene, &strengths, opening)
+}
+
+/// Emitted power over area, brightest channel, W m^-2: what the solver's bound is a part of.
+fn mean_exitance(scene: &LitScene) -> f64 {
+    let (mut power, mut area) = ([0.0; 3], 0.0);
+    for element in scene.mesh.element_ids() {
+        let own = geometry::polygon::area(&scene.mesh.element_corners(element));
+        let exitance = scene.material(element).exitance();
+        (0..3).for_each(|c| power[c] += own * exitance[c]);
+        area += own;
+    }
+    if area > 0.0 { power.into_iter().fold(0.0, f64::max) / area } else { 0.0 }
+}
+
+/// Writes the points as they were given, and behind each irradiance, and its error if `with_error`: csv or npy by the name's ending.
+pub fn write(path: &Path, points: &[ProbePoint], probed: &[Probed], with_error: bool) -> Result<()> {
+    let found =
+        |p: &Probed| -> Vec<f64> { p.irradiance.into_iter().chain(with_error.then_some(p.error)).collect() };
+    if TableFormat::of(path, &[TableFormat::Csv, TableFormat::Npy])? == TableFormat::Npy {
+        let columns = COLUMNS.len() + ADDED.len() + usize::from(with_error);
+        // The numbers as written in the table, not the unit normal.
+        let given = |p: &ProbePoint| -> Vec<f64> {
+            p.fields.iter().map(|field| field.parse().unwrap_or(f64::NAN)).collect()
+        };
+        let rows = points.iter().zip(probed).flat_map(|(p, q)| given(p).into_iter().chain(found(q)));
+        return Ok(write_npy(path, columns, points.len(), rows).map(|_| ())?);
+    }
+    let added = ADDED.iter().copied().chain(with_error.then_some(ERROR));
+    let header: Vec<String> = COLUMNS.iter().copied().chain(added).map(String::from).collect();
+    let rows = points.iter().zip(probed).map(|(point, probed)| {
+        point.fields.iter().cloned().chain(found(probed).into_iter().map(number)).collect()
     });
     Ok(write_csv(path, &header, rows).map(|_| ())?)
 }
@@ -80,8 +140,9 @@ mod tests {
         ];
         let common = Common { threads: None, quiet: true, verbose: false };
         let mut report = Report::new("shade-tool", "test");
-        for h in probe(&scene, &points, &common, &mut report) {
-            for (got, want) in h.iter().zip([1.0, 2.0, 0.0]) {
+        for probed in probe(&scene, &points, Opening::EXACT, &common, &mut report) {
+            assert!(probed.error < 1e-9, "{probed:?}");
+            for (got, want) in probed.irradiance.iter().zip([1.0, 2.0, 0.0]) {
                 assert!((got - want).abs() < 1e-9, "{got}, want {want}");
             }
         }
@@ -95,10 +156,42 @@ mod tests {
         let path = folder.path().join("out.csv");
         let mut given = point(0.0, 0.0, 0.0, DVec3::Y);
         given.fields[0] = "0.50".into();
-        write(&path, &[given], &[[0.1, 1.0 / 3.0, 2.0]]).unwrap();
+        let probed = [Probed { irradiance: [0.1, 1.0 / 3.0, 2.0], error: 0.25 }];
+        write(&path, std::slice::from_ref(&given), &probed, false).unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         assert_eq!(text, "x,y,z,nx,ny,nz,H_r,H_g,H_b\n0.50,0,0,0,1,0,0.1,0.3333333333333333,2\n");
-        write(&path, &[], &[]).unwrap();
+        write(&path, &[given], &probed, true).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert!(
+            text.starts_with("x,y,z,nx,ny,nz,H_r,H_g,H_b,H_error\n") && text.ends_with(",2,0.25\n"),
+            "{text}"
+        );
+        write(&path, &[], &[], false).unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "x,y,z,nx,ny,nz,H_r,H_g,H_b\n");
+    }
+
+    /// A floor under a wall whose radiosity varies: the estimate covers what finer elements change.
+    #[test]
+    fn estimated_error_covers_that_of_the_elements_size() {
+        let irradiance = |n: usize| {
+            let mut scene = cube(n);
+            // A ramp over the ceiling, element 2 n^2 to come after floor and before the walls.
+            scene.radiosity = vec![[0.0; 3]; 6 * n * n];
+            for k in 0..n * n {
+                let corners = &scene.sources[n * n + k];
+                let middle = corners.iter().sum::<DVec3>() / 4.0;
+                scene.radiosity[n * n + k] = [(3.0 * middle.x).sin() + 1.0; 3];
+            }
+            let common = Common { threads: None, quiet: true, verbose: false };
+            let points = [point(0.2, 0.0, 0.3, DVec3::Y), point(0.9, 0.8, 0.4, DVec3::Y)];
+            probe(&scene, &points, Opening::EXACT, &common, &mut Report::new("shade-tool", "test"))
+        };
+        for (coarse, fine) in irradiance(4).into_iter().zip(irradiance(32)) {
+            let error = (coarse.irradiance[0] - fine.irradiance[0]).abs();
+            assert!(
+                error > 0.0 && error < coarse.error && coarse.error < 100.0 * error,
+                "{error:.2e} {coarse:?}"
+            );
+        }
     }
 }

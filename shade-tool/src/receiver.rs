@@ -4,7 +4,11 @@
 use crate::lit_scene::LitScene;
 use geometry::gather::{Gatherer, Scratch};
 use geometry::merge::merged_occluders;
+use geometry::source_tree::{Opening, SourceTree};
 use glam::DVec3;
+use interchange::ids::ElementId;
+use interchange::report::Report;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Points on the border of a face or element take the limit from inside: they are moved by this part of the way towards
 /// its centroid.
@@ -30,32 +34,61 @@ pub struct Receiver {
     pub face: Option<u32>,
 }
 
-/// Everything that can light a point.
-#[derive(Debug)]
-pub struct Light<'a> {
-    gatherer: Gatherer,
-    radiosity: &'a [[f64; 3]],
+/// Irradiance, W m^-2, by where it comes from: RGB from the light that lamps emit, then RGB from what surfaces reflect.
+pub type Parts = [f64; 6];
+
+/// Both parts together.
+pub fn total(parts: &Parts) -> [f64; 3] {
+    std::array::from_fn(|c| parts[c] + parts[c + 3])
 }
 
-impl<'a> Light<'a> {
+/// Everything that can light a point.
+#[derive(Debug)]
+pub struct Light {
+    tree: SourceTree<6>,
+    opening: Opening,
+    /// Elements by exact factors, clusters by moments, clusters hidden, in this order.
+    tally: [AtomicU64; 3],
+}
+
+impl Light {
     /// The elements of the scene as sources, its faces as blockers.
-    pub fn new(scene: &'a LitScene) -> Light<'a> {
+    pub fn new(scene: &LitScene, opening: Opening) -> Light {
+        let mut strengths = vec![[0.0; 6]; scene.sources.len()];
+        for (drawn, &source) in scene.source_of.iter().enumerate() {
+            let exitance = scene.material(ElementId::new(drawn)).exitance();
+            let radiosity = scene.radiosity[source as usize];
+            // Where a lamp was changed since the solution, the light that reaches others is the solved one.
+            let emitted: [f64; 3] = std::array::from_fn(|c| exitance[c].min(radiosity[c]));
+            strengths[source as usize] =
+                std::array::from_fn(|c| if c < 3 { emitted[c] } else { radiosity[c - 3] - emitted[c - 3] });
+        }
+        Light::with_strengths(scene, &strengths, opening)
+    }
+
+    /// Sources whose six numbers may be something else than [`Parts`].
+    pub fn with_strengths(scene: &LitScene, strengths: &[[f64; 6]], opening: Opening) -> Light {
         let mesh = &scene.mesh;
         let pieces = mesh.occluders.rows().map(|row| row.iter().map(|v| v.0).collect()).collect();
         let positions: Vec<DVec3> = mesh.vertices.iter().copied().map(DVec3::from_array).collect();
         let gatherer = Gatherer::new(merged_occluders(pieces, &positions), scene.sources.clone());
-        Light { gatherer, radiosity: &scene.radiosity }
+        Light { tree: SourceTree::new(gatherer, strengths), opening, tally: Default::default() }
     }
 
-    /// Irradiance, RGB, W m^-2.
-    pub fn irradiance(&self, receiver: &Receiver, scratch: &mut Scratch) -> [f64; 3] {
-        let mut irradiance = [0.0; 3];
-        let mut add = |element: usize, factor: f64| {
-            for (sum, b_j) in irradiance.iter_mut().zip(self.radiosity[element]) {
-                *sum += factor * b_j;
-            }
-        };
-        self.gatherer.factors(receiver.point, receiver.normal, scratch, &mut add);
-        irradiance
+    /// Irradiance by its parts.
+    pub fn irradiance(&self, receiver: &Receiver, scratch: &mut Scratch) -> Parts {
+        let (parts, counts) = self.tree.gather(receiver.point, receiver.normal, self.opening, scratch);
+        for (sum, count) in self.tally.iter().zip([counts.exact, counts.far, counts.hidden]) {
+            sum.fetch_add(count, Ordering::Relaxed);
+        }
+        parts
+    }
+
+    /// Tells how sources were counted so far.
+    pub fn count(&self, report: &mut Report) {
+        for (name, sum) in ["sources_exact", "sources_far", "sources_hidden_skipped"].iter().zip(&self.tally)
+        {
+            report.count(name, sum.load(Ordering::Relaxed) as usize);
+        }
     }
 }

@@ -1,114 +1,201 @@
-//! The picture: visible surface per sample, radiosity at the nodes that are seen, linear interpolation between them
-//! (Gouraud 1971), plain mean over the samples of a pixel. Samples have fixed places, so a picture has no
-//! noise and is the same for any number of threads.
+//! The picture: visible surface per sample, irradiance at the nodes that are seen, interpolated between them
+//! (Gouraud 1971) or gathered at the sample, plain mean over the samples of a pixel. Samples have fixed places, so a
+//! picture has no noise and is the same for any number of threads.
 
 use crate::camera::Camera;
 use crate::interpolation::corner_weights;
+use crate::layers::{Layer, NOTHING, Pixel, Values};
 use crate::lit_scene::LitScene;
 use crate::nodes::NodeRadiosity;
 use crate::picture::Picture;
-use crate::refined::RefinedFacets;
+use crate::receiver::{Parts, total};
+use crate::refined::{Goal, RefinedFacets, Scheme};
 use crate::visible::{Seen, VisibleSurface};
+use geometry::gather::Scratch;
+use geometry::polygon;
+use geometry::source_tree::Opening;
 use interchange::ids::ElementId;
 use interchange::report::{Phase, Report};
 use interchange::tool::Common;
 use rayon::prelude::*;
 use std::f64::consts::FRAC_1_PI;
 use std::ops::Range;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 
-/// The picture is made in bands of rows with about this many samples: 32 MB of what they see are kept at a time.
+/// The picture is made in bands of rows with about this many samples: 40 MB of what they see are kept at a time.
 const SAMPLES_PER_BAND: usize = 1 << 20;
 
-/// How a picture is sampled and how linear its facets must be.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// How a picture is sampled and how well irradiance is interpolated.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Quality {
     /// Samples along each side of a pixel.
     pub samples: usize,
-    /// Facets are cut while the middle of an edge is off the mean of its ends by more than this part of its value.
+    /// Interpolation over facets, `None` for the solution's own constant values.
+    pub scheme: Option<Scheme>,
+    /// Facets are cut while interpolation is off by more than this part of the value.
     pub tolerance: f64,
+    /// Layers to make besides radiance.
+    pub layers: Vec<Layer>,
 }
 
-/// Renders the scene, and reports phases and counters.
+/// A scene ready to be seen by any number of cameras: nodes are gathered once.
+#[derive(Debug)]
+pub struct Renderer<'a> {
+    scene: &'a LitScene,
+    surface: VisibleSurface,
+    nodes: NodeRadiosity<'a>,
+}
+
+/// Renders the scene with one camera.
 pub fn render(
     scene: &LitScene,
     camera: &Camera,
-    quality: Quality,
+    quality: &Quality,
+    opening: Opening,
     common: &Common,
     report: &mut Report,
 ) -> Picture {
-    let surface = report.phase("hierarchy", || VisibleSurface::new(scene));
-    let mut nodes = report.phase("gatherer", || NodeRadiosity::new(scene));
-    let [width, height] = camera.size.map(|n| n as usize);
-    let samples = quality.samples;
-    let per_pixel = samples * samples;
-    let rows_per_band = (SAMPLES_PER_BAND / (width * per_pixel)).max(1);
-    let bands: Vec<Range<usize>> =
-        (0..height).step_by(rows_per_band).map(|top| top..(top + rows_per_band).min(height)).collect();
-    let look = |band: &Range<usize>| -> Vec<Seen> {
-        let rows = band.clone().into_par_iter();
-        rows.flat_map_iter(|row| samples_of_row(&surface, camera, row, samples)).collect()
-    };
-
-    // Find what every sample sees, and so how many samples every facet has; a single band is kept for later.
-    let mut kept = None;
-    let mut seen_samples = vec![0u32; scene.mesh.element_count()];
-    report.phase("visible surface", || {
-        for band in &bands {
-            let seen = look(band);
-            count_samples(&seen, &mut seen_samples);
-            kept = (bands.len() == 1).then_some(seen);
-        }
-    });
-
-    // Gather at the nodes of the facets that are seen, and in between where radiosity is not linear.
-    let elements: Vec<ElementId> =
-        (0..seen_samples.len()).filter(|&k| seen_samples[k] > 0).map(ElementId::new).collect();
-    let bar = common.progress("render", height);
-    report.phase("gather at nodes", || {
-        nodes.gather(&elements, |points| bar.inc_length(points as u64), || bar.inc(1));
-    });
-    let facets: Vec<(ElementId, f64)> =
-        elements.iter().map(|&e| (e, f64::from(seen_samples[e.index()]) / per_pixel as f64)).collect();
-    let refined = report.phase("gather in between", || {
-        RefinedFacets::new(&nodes, &surface, &facets, quality.tolerance, || bar.tick())
-    });
-
-    // Interpolate, and average over each pixel.
-    let mut picture = Picture { width, height, pixels: Vec::with_capacity(width * height) };
-    report.count("background_samples", 0);
-    report.count("back_face_samples", 0);
-    let start = Instant::now();
-    for band in &bands {
-        let seen = kept.take().unwrap_or_else(|| look(band));
-        count_unlit(&seen, report);
-        let band_pixels: Vec<[f64; 3]> = seen
-            .par_chunks(per_pixel)
-            .map_init(Vec::new, |weights, seen| pixel(&surface, &nodes, &refined, seen, weights))
-            .collect();
-        picture.pixels.extend(band_pixels);
-        bar.inc(band.len() as u64);
-    }
-    report.phases.push(Phase { name: "interpolation".into(), seconds: start.elapsed().as_secs_f64() });
-    bar.finish_and_clear();
-    report.count("samples", width * height * per_pixel);
-    report.count("nodes_gathered", nodes.counts.whole);
-    report.count("nodes_split", nodes.counts.split);
-    report.count("node_edges_gathered", nodes.counts.edges);
-    report.count("nodes_black_skipped", nodes.counts.black);
-    report.count("nodes_unseen_skipped", nodes.counts.unseen);
-    report.count("points_gathered_in_between", refined.gathered);
-    report.count("facets_cut", refined.cut);
-    for (channel, mean) in ["r", "g", "b"].iter().zip(picture.mean()) {
-        report.estimate(&format!("mean_radiance_{channel}"), mean);
-    }
+    let mut renderer = Renderer::new(scene, opening, report);
+    let picture = renderer.render(camera, quality, common, report);
+    renderer.count(report);
     picture
+}
+
+/// What is known of a sample before it is averaged.
+struct Looks<'a> {
+    scene: &'a LitScene,
+    surface: &'a VisibleSurface,
+    nodes: &'a NodeRadiosity<'a>,
+    refined: Option<&'a RefinedFacets>,
+    gathered: &'a AtomicU64,
+}
+
+impl<'a> Renderer<'a> {
+    /// Prepares the scene; `opening` says how exactly is gathered.
+    pub fn new(scene: &'a LitScene, opening: Opening, report: &mut Report) -> Renderer<'a> {
+        let surface = report.phase("hierarchy", || VisibleSurface::new(scene));
+        let nodes = report.phase("gatherer", || NodeRadiosity::new(scene, opening));
+        Renderer { scene, surface, nodes }
+    }
+
+    /// Renders with a camera, and reports phases and counters.
+    pub fn render(
+        &mut self,
+        camera: &Camera,
+        quality: &Quality,
+        common: &Common,
+        report: &mut Report,
+    ) -> Picture {
+        let [width, height] = camera.size.map(|n| n as usize);
+        let samples = quality.samples;
+        let per_pixel = samples * samples;
+        let rows_per_band = (SAMPLES_PER_BAND / (width * per_pixel)).max(1);
+        let bands: Vec<Range<usize>> =
+            (0..height).step_by(rows_per_band).map(|top| top..(top + rows_per_band).min(height)).collect();
+        let surface = &self.surface;
+        let look = |band: &Range<usize>| -> Vec<Seen> {
+            let rows = band.clone().into_par_iter();
+            rows.flat_map_iter(|row| samples_of_row(surface, camera, row, samples)).collect()
+        };
+
+        // Find what every sample sees, and so how many samples every facet has; a single band is kept for later.
+        let mut kept = None;
+        let mut seen_samples = vec![0u32; self.scene.mesh.element_count()];
+        report.phase("visible surface", || {
+            for band in &bands {
+                let seen = look(band);
+                count_samples(&seen, &mut seen_samples);
+                kept = (bands.len() == 1).then_some(seen);
+            }
+        });
+
+        // Gather at the nodes of the facets that are seen, and in between where interpolation does not serve.
+        let elements: Vec<ElementId> =
+            (0..seen_samples.len()).filter(|&k| seen_samples[k] > 0).map(ElementId::new).collect();
+        let bar = common.progress("render", height);
+        let refined = quality.scheme.map(|scheme| {
+            report.phase("gather at nodes", || {
+                self.nodes.gather(&elements, |points| bar.inc_length(points as u64), || bar.inc(1));
+            });
+            let facets: Vec<(ElementId, f64)> = elements
+                .iter()
+                .map(|&e| (e, f64::from(seen_samples[e.index()]) / per_pixel as f64))
+                .collect();
+            let goal = Goal { scheme, tolerance: quality.tolerance };
+            report.phase("gather in between", || {
+                RefinedFacets::new(&self.nodes, surface, &facets, goal, || bar.tick())
+            })
+        });
+
+        // Interpolate, and average over each pixel.
+        let mut picture = Picture { width, height, ..Picture::default() };
+        let mut layers = quality.layers.clone();
+        layers.sort_unstable();
+        layers.dedup();
+        report.count("background_samples", 0);
+        report.count("back_face_samples", 0);
+        let gathered = AtomicU64::new(0);
+        let looks = Looks {
+            scene: self.scene,
+            surface,
+            nodes: &self.nodes,
+            refined: refined.as_ref(),
+            gathered: &gathered,
+        };
+        let start = Instant::now();
+        for band in &bands {
+            let seen = kept.take().unwrap_or_else(|| look(band));
+            count_unlit(&seen, report);
+            let pixels: Vec<Pixel> = seen
+                .par_chunks(per_pixel)
+                .map_init(<(Vec<f64>, Scratch)>::default, |memory, seen| looks.pixel(seen, memory))
+                .collect();
+            picture.pixels.extend(pixels.iter().map(|pixel| pixel.radiance));
+            append_layers(&mut picture.layers, &layers, &pixels);
+            bar.inc(band.len() as u64);
+        }
+        report.phases.push(Phase { name: "interpolation".into(), seconds: start.elapsed().as_secs_f64() });
+        bar.finish_and_clear();
+        report.count("samples", width * height * per_pixel);
+        report.count("samples_gathered", gathered.load(Ordering::Relaxed) as usize);
+        if let Some(refined) = &refined {
+            report.count("points_gathered_in_between", refined.gathered);
+            report.count("facets_cut", refined.cut);
+            report.count("facets_unresolved", refined.unresolved);
+        }
+        for (channel, mean) in ["r", "g", "b"].iter().zip(picture.mean()) {
+            report.estimate(&format!("mean_radiance_{channel}"), mean);
+        }
+        picture
+    }
+
+    /// Tells what was gathered, and what was not.
+    pub fn count(&self, report: &mut Report) {
+        let counts = self.nodes.counts;
+        report.count("nodes_gathered", counts.whole);
+        report.count("nodes_split", counts.split);
+        report.count("node_edges_gathered", counts.edges);
+        report.count("nodes_black_skipped", counts.black);
+        report.count("nodes_unseen_skipped", counts.unseen);
+        self.nodes.light().count(report);
+    }
+}
+
+fn append_layers(all: &mut Vec<(Layer, Values)>, layers: &[Layer], pixels: &[Pixel]) {
+    for (k, &layer) in layers.iter().enumerate() {
+        let values = layer.of(pixels);
+        match all.get_mut(k) {
+            Some((_, values_before)) => values_before.append(values),
+            None => all.push((layer, values)),
+        }
+    }
 }
 
 /// Adds the samples of each facet.
 fn count_samples(seen: &[Seen], samples: &mut [u32]) {
     for sample in seen {
-        if let Seen::Surface(element, _) = sample {
+        if let Seen::Surface(element, ..) = sample {
             samples[element.index()] = samples[element.index()].saturating_add(1);
         }
     }
@@ -143,26 +230,76 @@ fn count_unlit(seen: &[Seen], report: &mut Report) {
     report.count("back_face_samples", seen.iter().filter(|s| **s == Seen::Back).count());
 }
 
-/// Mean radiance B / pi over the samples of a pixel.
-fn pixel(
-    surface: &VisibleSurface,
-    nodes: &NodeRadiosity,
-    refined: &RefinedFacets,
-    seen: &[Seen],
-    weights: &mut Vec<f64>,
-) -> [f64; 3] {
-    let mut sum = [0.0; 3];
-    for sample in seen {
-        let Seen::Surface(element, place) = *sample else { continue };
-        let radiosity = refined.at(element, place, weights).unwrap_or_else(|| {
-            corner_weights(surface.corners(element), place, weights);
-            nodes.interpolate(element, weights)
-        });
-        for (sum, b) in sum.iter_mut().zip(radiosity) {
-            *sum += b;
+impl Looks<'_> {
+    /// Mean over the samples of a pixel.
+    fn pixel(&self, seen: &[Seen], (weights, scratch): &mut (Vec<f64>, Scratch)) -> Pixel {
+        let mut pixel = Pixel { element: NOTHING, face: NOTHING, ..Pixel::default() };
+        let add = |sum: &mut [f64; 3], value: [f64; 3], factor: f64| {
+            (0..3).for_each(|c| sum[c] += factor * value[c]);
+        };
+        let share = 1.0 / seen.len().max(1) as f64;
+        let radiance = share * FRAC_1_PI;
+        let mut depths: Vec<(u32, u32, f64)> = Vec::new();
+        for sample in seen {
+            let Seen::Surface(element, place, depth) = *sample else { continue };
+            let (material, source) = (self.scene.material(element), self.scene.source_of[element.index()]);
+            let (exitance, rho) = (material.exitance(), material.diffuse);
+            let (parts, error) = self.irradiance(element, place, weights, scratch);
+            let irradiance = total(&parts);
+            // A constant element shows the solution's own radiosity.
+            let radiosity = match self.refined {
+                Some(_) => std::array::from_fn(|c| exitance[c] + rho[c] * irradiance[c]),
+                None => self.scene.radiosity[source as usize],
+            };
+            add(&mut pixel.radiance, radiosity, radiance);
+            add(&mut pixel.albedo, rho, share);
+            add(&mut pixel.irradiance, irradiance, share);
+            add(&mut pixel.direct, std::array::from_fn(|c| exitance[c] + rho[c] * parts[c]), radiance);
+            add(&mut pixel.indirect, std::array::from_fn(|c| rho[c] * parts[c + 3]), radiance);
+            let corners = self.scene.mesh.element_corners(element);
+            add(&mut pixel.normal, polygon::vector_area(&corners).normalize_or_zero().to_array(), share);
+            pixel.error += radiance * error;
+            let face = self.scene.mesh.face_inputs[self.scene.mesh.element_face(element).index()];
+            depths.push((source, face, depth));
+        }
+        // The element most samples see, the lower one of equals, gives indices and depth.
+        depths.sort_by_key(|&(source, ..)| source);
+        let most = depths
+            .chunk_by(|a, b| a.0 == b.0)
+            .max_by_key(|chunk| (chunk.len(), std::cmp::Reverse(chunk[0].0)));
+        if let Some(chunk) = most {
+            (pixel.element, pixel.face) = (chunk[0].0, chunk[0].1);
+            pixel.depth = chunk.iter().map(|&(.., depth)| depth).sum::<f64>() / chunk.len() as f64;
+        }
+        pixel
+    }
+
+    /// Irradiance at a place of an element, and the estimated error of radiosity there.
+    fn irradiance(
+        &self,
+        element: ElementId,
+        place: glam::DVec2,
+        weights: &mut Vec<f64>,
+        scratch: &mut Scratch,
+    ) -> (Parts, f64) {
+        let Some(refined) = self.refined else {
+            let h = self.scene.irradiance[self.scene.source_of[element.index()] as usize];
+            return ([0.0, 0.0, 0.0, h[0], h[1], h[2]], 0.0);
+        };
+        match refined.at(element, place, weights) {
+            Some(found) => match found.gather {
+                Some(receiver) if self.nodes.reflects(element) => {
+                    self.gathered.fetch_add(1, Ordering::Relaxed);
+                    (self.nodes.gathered(element, &receiver, scratch), 0.0)
+                }
+                _ => (found.irradiance, found.error),
+            },
+            None => {
+                corner_weights(self.surface.corners(element), place, weights);
+                (self.nodes.interpolate(element, weights), 0.0)
+            }
         }
     }
-    sum.map(|radiosity| radiosity * FRAC_1_PI / seen.len().max(1) as f64)
 }
 
 #[cfg(test)]
@@ -179,7 +316,11 @@ mod tests {
     }
 
     fn fine(samples: usize) -> Quality {
-        Quality { samples, tolerance: 0.01 }
+        Quality { samples, scheme: Some(Scheme::Linear), tolerance: 0.01, layers: Vec::new() }
+    }
+
+    fn rendered(scene: &LitScene, camera: &Camera, quality: &Quality, report: &mut Report) -> Picture {
+        render(scene, camera, quality, Opening::EXACT, &quiet(), report)
     }
 
     fn report() -> Report {
@@ -214,7 +355,7 @@ mod tests {
             let eye = DVec3::new(0.3, 0.4, 0.2);
             let camera = Camera::new(eye, DVec3::ONE, DVec3::Y, Lens::Vertical(100.0), [16, 12]).unwrap();
             let mut report = report();
-            let picture = render(&scene, &camera, fine(3), &quiet(), &mut report);
+            let picture = rendered(&scene, &camera, &fine(3), &mut report);
             assert_eq!(picture.pixels.len(), 16 * 12);
             for value in picture.pixels.iter().flatten() {
                 assert!((value - FRAC_1_PI).abs() < 1e-9, "{value}");
@@ -233,7 +374,7 @@ mod tests {
         let scene = cube(2);
         let camera = Camera::framing(scene.bounds(), DVec3::Y, Lens::Vertical(40.0), [32, 32]).unwrap();
         let mut framed = report();
-        let picture = render(&scene, &camera, fine(2), &quiet(), &mut framed);
+        let picture = rendered(&scene, &camera, &fine(2), &mut framed);
         assert_eq!(framed.counters["back_face_samples"], 0);
         assert!(framed.counters["background_samples"] > 100);
         assert!((picture.pixels[16 * 32 + 16][0] - FRAC_1_PI).abs() < 1e-9);
@@ -241,7 +382,7 @@ mod tests {
 
         let placed = Camera { framing: false, ..camera };
         let mut seen = report();
-        let picture = render(&scene, &placed, fine(2), &quiet(), &mut seen);
+        let picture = rendered(&scene, &placed, &fine(2), &mut seen);
         assert_eq!(seen.counters["background_samples"], framed.counters["background_samples"]);
         assert_eq!(seen.counters["background_samples"] + seen.counters["back_face_samples"], 4 * 32 * 32);
         assert!(picture.pixels.iter().all(|p| *p == [0.0; 3]));
@@ -258,7 +399,7 @@ mod tests {
         for z in [1.0, -1.0] {
             let (eye, at) = (DVec3::new(0.5, 0.5, z), DVec3::new(0.5, 0.5, 0.0));
             let camera = Camera::new(eye, at, DVec3::Y, Lens::Vertical(10.0), [4, 4]).unwrap();
-            let picture = render(&scene, &camera, fine(1), &quiet(), &mut report());
+            let picture = rendered(&scene, &camera, &fine(1), &mut report());
             for (got, want) in picture.pixels.iter().flat_map(|p| p.iter().zip([1.0, 2.0, 3.0])) {
                 assert!((got - want).abs() < 1e-12, "{got}, want {want}");
             }
@@ -277,12 +418,62 @@ mod tests {
         let above = DVec3::new(0.5, 1.0, 0.5);
         let camera =
             Camera::new(above, DVec3::new(0.5, 0.0, 0.5), DVec3::Z, Lens::Vertical(90.0), [9, 9]).unwrap();
-        let picture = render(&scene, &camera, fine(1), &quiet(), &mut report());
+        let picture = rendered(&scene, &camera, &fine(1), &mut report());
         // The mean value coordinates of a square are symmetric: its middle is the mean of its four corners.
         let far = (1f64.atan() - 0.5f64.sqrt() * 0.5f64.sqrt().atan()) / std::f64::consts::TAU;
         let want = 0.5 * (0.375 + far) * FRAC_1_PI;
         let middle = picture.pixels[4 * 9 + 4][0];
         // The limits are taken at 1e-4 of an edge's length.
         assert!((middle - want).abs() < 3e-4, "{middle}, want {want}");
+    }
+
+    /// All layers of a furnace: what a wall is, where it is, and light that adds up.
+    #[test]
+    fn layers_hold_what_is_seen() {
+        let mut scene = cube(2);
+        scene.materials[0].diffuse = [0.5, 0.25, 0.0];
+        scene.materials[0].radiance = [0.5, 0.75, 1.0].map(|b| b * FRAC_1_PI);
+        let eye = DVec3::new(0.5, 0.4, 0.2);
+        let camera = Camera::new(eye, eye + DVec3::Z, DVec3::Y, Lens::Vertical(50.0), [9, 9]).unwrap();
+        use clap::ValueEnum;
+        for scheme in [Scheme::Linear, Scheme::Quadratic, Scheme::Gather] {
+            let layers = Layer::value_variants().to_vec();
+            let quality = Quality { scheme: Some(scheme), layers, ..fine(2) };
+            let picture = rendered(&scene, &camera, &quality, &mut report());
+            let triple = |layer: Layer| match picture.layer(layer) {
+                Some(Values::Triples(values)) => values[40],
+                other => unreachable!("{other:?}"),
+            };
+            assert_eq!(triple(Layer::Albedo), [0.5, 0.25, 0.0]);
+            assert_eq!(triple(Layer::Normal), [0.0, 0.0, -1.0]);
+            let close = |got: [f64; 3], want: [f64; 3]| {
+                assert!((0..3).all(|c| (got[c] - want[c]).abs() < 1e-9), "{got:?} {want:?}");
+            };
+            close(triple(Layer::Irradiance), [1.0; 3]);
+            // Half of what arrives is emitted, in the first channel; all is, in the last, which reflects nothing.
+            close(triple(Layer::Direct), [0.75, 0.75 + 0.25 * 0.75, 1.0].map(|b| b * FRAC_1_PI));
+            close(triple(Layer::Indirect), [0.25, 0.0625, 0.0].map(|b| b * FRAC_1_PI));
+            let Some(Values::Numbers(depths)) = picture.layer(Layer::Depth) else { unreachable!() };
+            assert!(depths.iter().all(|&depth| (depth - 0.8).abs() < 1e-12), "{depths:?}");
+            let Some(Values::Indices(elements)) = picture.layer(Layer::Element) else { unreachable!() };
+            // The wall z = 1 has the last four of the 24 elements.
+            assert!(elements.iter().all(|&element| (20..24).contains(&element)), "{elements:?}");
+            assert_eq!(picture.layer(Layer::Face), Some(&Values::Indices(vec![5; 81])));
+        }
+    }
+
+    #[test]
+    fn constant_shows_the_solution() {
+        let mut scene = cube(2);
+        scene.radiosity = (0..24).map(|k| [f64::from(k), 0.0, 1.0]).collect();
+        let eye = DVec3::new(0.5, 0.5, 0.2);
+        let camera = Camera::new(eye, eye + DVec3::Z, DVec3::Y, Lens::Vertical(30.0), [2, 2]).unwrap();
+        let quality = Quality { scheme: None, ..fine(2) };
+        let picture = rendered(&scene, &camera, &quality, &mut report());
+        let mut seen: Vec<f64> = picture.pixels.iter().map(|p| p[0] / FRAC_1_PI).collect();
+        seen.sort_by(f64::total_cmp);
+        for (got, want) in seen.iter().zip([20.0, 21.0, 22.0, 23.0]) {
+            assert!((got - want).abs() < 1e-12, "{seen:?}");
+        }
     }
 }

@@ -54,7 +54,17 @@ pub fn lit(mesh: Mesh) -> LitScene {
     let inputs = vec![("mesh", Digest::of(b"mesh"))];
     let materials = vec![Material { diffuse: [1.0; 3], ..Material::default() }];
     let sources = mesh.element_ids().map(|element| mesh.element_corners(element)).collect();
-    LitScene { mesh, sources, radiosity, materials, inputs }
+    let source_of = (0..mesh.element_count() as u32).collect();
+    LitScene {
+        mesh,
+        sources,
+        source_of,
+        irradiance: radiosity.clone(),
+        radiosity,
+        achieved: 0.0,
+        materials,
+        inputs,
+    }
 }
 
 /// The unit cube with inward fronts, n x n elements to a wall.

@@ -14,8 +14,8 @@ pub enum Seen {
     Background,
     /// The black back of a one-sided face.
     Back,
-    /// An element, at a place in its face's plane.
-    Surface(ElementId, DVec2),
+    /// An element, at a place in its face's plane, at a depth along the view.
+    Surface(ElementId, DVec2, f64),
 }
 
 /// The scene as rays see it.
@@ -41,20 +41,21 @@ impl VisibleSurface {
 
     /// What the camera sees at the place `x`, `y` of the picture, in pixels.
     pub fn seen(&self, camera: &Camera, x: f64, y: f64) -> Seen {
-        let direction = camera.direction(x, y);
+        let (origin, direction) = camera.ray(x, y);
         let drawn = |piece: usize, front: bool| {
             front || !camera.framing || self.two_sided[self.piece_faces[piece].index()]
         };
-        let Some(hit) = self.caster.closest_where(camera.eye, direction, drawn) else {
+        let Some(hit) = self.caster.closest_where(origin, direction, drawn) else {
             return Seen::Background;
         };
         let face = self.piece_faces[hit.piece];
         if !hit.front && !self.two_sided[face.index()] {
             return Seen::Back;
         }
-        let point = camera.eye + hit.distance * direction;
+        let point = origin + hit.distance * direction;
         let element = self.elements.at(face, usize::from(!hit.front), point);
-        element.map_or(Seen::Back, |(element, place)| Seen::Surface(element, place))
+        // Directions are such that the distance along them is the depth.
+        element.map_or(Seen::Back, |(element, place)| Seen::Surface(element, place, hit.distance))
     }
 
     /// Corners of an element in the plane of the places that are seen.

@@ -83,7 +83,9 @@ const INSIDE: &str = "--eye 0.5,0.5,0.1 --look-at 0.5,0.5,1 --fov-deg 100 --size
 #[test]
 fn render_writes_picture_preview_and_report() {
     let folder = furnace();
-    let line = format!("render s.sol --mesh s.mesh -o s.exr --png s.png --samples 2 --float {INSIDE}");
+    let line = format!(
+        "render s.sol --mesh s.mesh -o s.exr --png s.png --samples 2 --float --interpolation linear {INSIDE}"
+    );
     let output = run(folder.path(), &line);
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
 
@@ -236,8 +238,16 @@ fn bad_usage_ends_with_2() {
     let render = "render s.sol --mesh s.mesh -o s.exr";
     for flags in [
         // Of later work.
-        "--interpolation linear",
-        "--integrator phong",
+        "--integrator whitted",
+        "--layers bounces",
+        "--interpolation cubic",
+        "--interpolation constant --layers direct",
+        "--no-skip everything",
+        "--orthographic 0",
+        "--orthographic 1 --fov-deg 30",
+        "--panorama --orthographic 1",
+        "--turntable 0",
+        "--all-cameras",
         // Values out of range.
         "--size 0x4",
         "--samples 0",
@@ -265,6 +275,7 @@ fn bad_usage_ends_with_2() {
         "render s.sol -o s.exr",
         "probe s.sol --mesh s.mesh -o o.csv",
         "render s.sol --mesh s.mesh -o s.png",
+        "probe s.sol --mesh s.mesh --points p.csv -o out.txt",
     ] {
         assert_eq!(failure(folder.path(), line).0, Some(2), "{line}");
     }
@@ -286,4 +297,78 @@ fn other_materials_are_used_with_a_warning() {
     );
     let told = String::from_utf8(run(folder.path(), "info s.exr").stdout).unwrap();
     assert!(told.contains("R half: 0.000000 to 0.000000"), "{told}");
+}
+
+#[test]
+fn every_camera_of_a_toml_and_a_turntable_give_files_of_their_own() {
+    let folder = furnace();
+    let camera = |name: &str, lens: &str| {
+        format!(
+            "[[camera]]\nname = \"{name}\"\neye = [0.5, 0.5, 0.1]\nlook_at = [0.5, 0.5, 1]\nup = [0, 1, 0]\n\
+             resolution = [12, 6]\n{lens}\n"
+        )
+    };
+    let toml = camera("front", "fov_deg = 40")
+        + &camera("plan", "projection = \"orthographic\"\nview_height = 0.5")
+        + &camera("around", "projection = \"equirectangular\"");
+    std::fs::write(folder.path().join("c.toml"), toml).unwrap();
+    let line = "render s.sol --mesh s.mesh -o s.exr --png s.png --camera c.toml --all-cameras";
+    let output = run(folder.path(), line);
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+    for name in ["front", "plan", "around"] {
+        let told = run(folder.path(), &format!("info s.{name}.exr --json"));
+        let told: serde_json::Value = serde_json::from_slice(&told.stdout).unwrap();
+        let channel = &told["layers"][0]["channels"][2];
+        for key in ["min", "max"] {
+            let error = channel[key].as_f64().unwrap() * std::f64::consts::PI - 1.0;
+            // Halves round to 5e-4; the lamp's own and all walls' radiosity is 1.
+            assert!(error.abs() < 1e-3, "{name} {key}: {error}");
+        }
+        assert!(folder.path().join(format!("s.{name}.png")).exists());
+    }
+    let line = "render s.sol --mesh s.mesh -o t.exr --turntable 3 --size 8x8";
+    assert!(run(folder.path(), line).status.success());
+    assert!((0..3).all(|k| folder.path().join(format!("t.00{k}.exr")).exists()));
+    std::fs::write(folder.path().join("none.toml"), "two_sided = []\n").unwrap();
+    let output = run(folder.path(), "render s.sol --mesh s.mesh -o s.exr --camera none.toml --size 8x8");
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && stderr.contains("none.toml: has no camera"), "{stderr}");
+}
+
+#[test]
+fn layers_are_stored_by_name_and_skips_do_not_change_the_answer() {
+    let folder = furnace();
+    let line = format!(
+        "render s.sol --mesh s.mesh -o s.exr {INSIDE} --layers albedo,normal,depth,element,face,irradiance,direct,indirect,error"
+    );
+    assert!(run(folder.path(), &line).status.success());
+    let told = String::from_utf8(run(folder.path(), "info s.exr").stdout).unwrap();
+    for channel in [
+        "albedo.R half",
+        "normal.Z half",
+        "depth.Z float",
+        "element.id uint",
+        "face.id uint",
+        "irradiance.B half",
+        "direct.G half",
+        "indirect.G half",
+        "error.V half",
+    ] {
+        assert!(told.contains(channel), "{channel}: {told}");
+    }
+    for attribute in ["worldToCamera", "worldToNDC", "whiteLuminance: 179", "chromaticities"] {
+        assert!(told.contains(attribute), "{attribute}: {told}");
+    }
+    let values = |flags: &str| {
+        let line = format!("render s.sol --mesh s.mesh -o t.exr --float --size 9x9 {flags}");
+        assert!(run(folder.path(), &line).status.success(), "{flags}");
+        let told = run(folder.path(), "info t.exr --json");
+        let told: serde_json::Value = serde_json::from_slice(&told.stdout).unwrap();
+        told["layers"][0]["channels"][2]["mean"].as_f64().unwrap()
+    };
+    let want = values("");
+    for flags in ["--no-skip far", "--no-skip hidden", "--no-skip far,hidden", "--interpolation gather"] {
+        // In a furnace all that is gathered is 1; the lamp's part of the tolerance is a tenth of 0.02.
+        assert!((values(flags) / want - 1.0).abs() < 2e-3, "{flags}");
+    }
 }

@@ -1,6 +1,6 @@
 //! What a camera's numbers must satisfy for a picture to exist.
 
-use super::settings::CameraSettings;
+use super::settings::{CameraSettings, ProjectionSettings};
 
 /// Most pixels along a side.
 const LARGEST_SIDE: u32 = 65536;
@@ -54,10 +54,33 @@ fn unit(vector: [f64; 3]) -> Option<[f64; 3]> {
     Some(scaled.map(|x| x / length))
 }
 
-/// Either focal length and film, or the field of view.
+/// A pinhole has either focal length and film, or the field of view; an orthographic camera a height; a panorama nothing.
 fn check_lens(camera: &CameraSettings) -> Result<(), Fault> {
     const EXPECTED: &str = "expected either focal_length with film, or fov_deg";
     let positive = |x: f64| x.is_finite() && x > 0.0;
+    if camera.projection != ProjectionSettings::Perspective {
+        let lens = [
+            ("focal_length", camera.focal_length.is_some()),
+            ("film", camera.film.is_some()),
+            ("fov_deg", camera.fov_deg.is_some()),
+        ];
+        if let Some((key, _)) = lens.into_iter().find(|(_, given)| *given) {
+            return Err((key, format!("{key} belongs to a perspective camera; remove it or the projection")));
+        }
+    }
+    match (camera.projection, camera.view_height) {
+        (ProjectionSettings::Orthographic, Some(height)) if positive(height) => return Ok(()),
+        (ProjectionSettings::Orthographic, found) => {
+            let found = found.map_or("missing".to_owned(), |height| height.to_string());
+            let message = format!("view_height is {found}; an orthographic camera needs one greater than 0");
+            return Err(("view_height", message));
+        }
+        (_, Some(_)) => {
+            return Err(("view_height", "view_height belongs to an orthographic camera".into()));
+        }
+        (ProjectionSettings::Equirectangular, None) => return Ok(()),
+        (ProjectionSettings::Perspective, None) => {}
+    }
     match (camera.focal_length, camera.film, camera.fov_deg) {
         (Some(focal_length), Some(film), None) => {
             if !positive(focal_length) {

@@ -15,6 +15,19 @@ const KEYS: [&str; 4] = ["camera", "two_sided", "units", "medium"];
 /// Units of length that `units` may name.
 const UNITS: [&str; 9] = ["m", "km", "dm", "cm", "mm", "um", "in", "ft", "yd"];
 
+/// How a camera turns places of the picture into rays.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ProjectionSettings {
+    /// Through a pinhole.
+    #[default]
+    Perspective,
+    /// Parallel rays.
+    Orthographic,
+    /// All directions, longitude by latitude.
+    Equirectangular,
+}
+
 /// A camera as the toml describes it.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -35,6 +48,11 @@ pub struct CameraSettings {
     pub film: Option<[f64; 2]>,
     /// Vertical field of view in degrees, between 0 and 180, instead of focal length and film.
     pub fov_deg: Option<f64>,
+    /// Projection; a pinhole where absent.
+    #[serde(default)]
+    pub projection: ProjectionSettings,
+    /// Height of an orthographic picture in the scene's unit, greater than 0.
+    pub view_height: Option<f64>,
 }
 
 /// Contents of the toml.

@@ -32,8 +32,29 @@ fn integers_are_taken_where_numbers_are_asked() {
         focal_length: None,
         film: None,
         fov_deg: Some(40.0),
+        projection: ProjectionSettings::Perspective,
+        view_height: None,
     };
     assert_eq!(settings.cameras, [expected]);
+}
+
+#[test]
+fn projections_ask_for_what_they_need() {
+    let with = |lines: &str| CAMERA.replace("fov_deg = 40\n", lines);
+    let orthographic = parsed(&with("projection = \"orthographic\"\nview_height = 3\n"));
+    assert_eq!(orthographic.cameras[0].view_height, Some(3.0));
+    let panorama = parsed(&with("projection = \"equirectangular\"\n"));
+    assert_eq!(panorama.cameras[0].projection, ProjectionSettings::Equirectangular);
+    for (lines, words) in [
+        ("projection = \"orthographic\"\n", "view_height is missing"),
+        ("projection = \"orthographic\"\nview_height = 0\n", "view_height is 0"),
+        ("projection = \"equirectangular\"\nview_height = 1\n", "belongs to an orthographic"),
+        ("projection = \"equirectangular\"\nfov_deg = 90\n", "belongs to a perspective"),
+        ("fov_deg = 40\nview_height = 1\n", "belongs to an orthographic"),
+        ("projection = \"fisheye\"\n", "unknown variant"),
+    ] {
+        assert!(refusal(&with(lines)).contains(words), "{lines}: {}", refusal(&with(lines)));
+    }
 }
 
 #[test]
