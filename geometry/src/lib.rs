@@ -26,4 +26,5 @@ pub mod sides;
 pub mod strata;
 pub mod unoccluded;
 pub mod visible;
+pub mod visible_four;
 pub mod visible_part;

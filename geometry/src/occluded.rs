@@ -6,6 +6,7 @@ use crate::polygon;
 use crate::quadrature::gauss;
 use crate::shadow::{Blocking, From, Set, Shadows};
 use crate::shadow_planes::{ShadowPlane, WORTHLESS_CUT, shadow_planes};
+use crate::visible_four::{self, LANES, visible_factors};
 use crate::visible_part::{self, visible_factor};
 use glam::DVec3;
 use std::collections::BinaryHeap;
@@ -111,6 +112,7 @@ impl Ord for Cell {
 #[derive(Debug, Default)]
 pub struct Scratch {
     visible: visible_part::Scratch,
+    four: visible_four::Scratch,
     corners: Vec<DVec3>,
     cells: BinaryHeap<Cell>,
     values: Vec<(f64, f64)>,
@@ -328,19 +330,26 @@ impl Integral<'_, '_> {
         } else {
             // Edges of different bodies that seem to cross (EEE) are in no shadow plane: what they let through or take
             // away shows first in the cell's corners.
-            let corners = cell.corners.len() as f64;
-            let outer: f64 = cell.corners.clone().map(|k| self.near_corner(k, centre, &cell)).sum();
-            let tip = (value - cell.area * outer / corners).abs();
+            let outer = self.mean_near_corners(centre, &cell);
+            let tip = (value - cell.area * outer).abs();
             cell.is_rough = tip > BENT * distance;
             (KINK * distance).max(if cell.is_rough { CORNER_ERROR * tip } else { 0.0 })
         };
         self.keep(cell);
     }
 
-    /// What is seen just inside corner `k` of a cell: on a contact line the corner itself has no view of its own.
-    fn near_corner(&mut self, k: usize, centre: DVec3, cell: &Cell) -> f64 {
-        let corner = self.scratch.corners[k];
-        self.at(corner + CORNER_INSET * (centre - corner), cell.shadows.clone())
+    /// Mean of what is seen just inside the corners: on a contact line the corner itself has no view of its own.
+    fn mean_near_corners(&mut self, centre: DVec3, cell: &Cell) -> f64 {
+        let count = cell.corners.len();
+        let inset = |corner: DVec3| corner + CORNER_INSET * (centre - corner);
+        let mut sum = 0.0;
+        for first in (0..count).step_by(LANES) {
+            let number = (count - first).min(LANES);
+            let at = |k: usize| inset(self.scratch.corners[cell.corners.start + first + k.min(number - 1)]);
+            let points = [at(0), at(1), at(2), at(3)];
+            sum += self.at_four(&points, cell)[..number].iter().sum::<f64>();
+        }
+        sum / count as f64
     }
 
     /// The shadow plane that cuts the cell most evenly.
@@ -372,6 +381,21 @@ impl Integral<'_, '_> {
         seen
     }
 
+    /// What four points of a cell see.
+    fn at_four(&mut self, points: &[DVec3; LANES], cell: &Cell) -> [f64; LANES] {
+        let (source, which) = (self.source.corners, (cell.shadows.clone(), self.from));
+        match visible_factors(points, self.normal, source, self.shadows, which, &mut self.scratch.four) {
+            None => points.map(|point| self.at(point, cell.shadows.clone())),
+            Some(seen) => {
+                self.evaluations += LANES;
+                for value in seen {
+                    (self.low, self.high) = (self.low.min(value), self.high.max(value));
+                }
+                seen
+            }
+        }
+    }
+
     /// n x n Gauss points on each quadrilateral of a fan, squeezed into triangles.
     fn integrate(&mut self, cell: &Cell, n: usize) -> f64 {
         let rule = gauss(n);
@@ -383,6 +407,8 @@ impl Integral<'_, '_> {
             let (a, b, c) = (corner(0), corner(k), corner(k + 1));
             // A triangle is a quadrilateral whose first corner is doubled.
             let d = if k + 2 < count { corner(k + 2) } else { a };
+            // Orders are even: the points come in fours.
+            let (mut points, mut weights, mut filled) = ([DVec3::ZERO; LANES], [0.0; LANES], 0);
             for (s, ws) in rule.points.iter().zip(&rule.weights) {
                 let s = 0.5 * (1.0 + s);
                 let (near, far) = (a + s * (b - a), d + s * (c - d));
@@ -390,9 +416,14 @@ impl Integral<'_, '_> {
                 for (t, wt) in rule.points.iter().zip(&rule.weights) {
                     let t = 0.5 * (1.0 + t);
                     let along = along_near + t * (along_far - along_near);
-                    let jacobian = along.cross(far - near).dot(self.normal);
-                    let point = near + t * (far - near);
-                    value += 0.25 * ws * wt * jacobian * self.at(point, cell.shadows.clone());
+                    points[filled] = near + t * (far - near);
+                    weights[filled] = 0.25 * ws * wt * along.cross(far - near).dot(self.normal);
+                    filled += 1;
+                    if filled == LANES {
+                        let seen = self.at_four(&points, cell);
+                        value += (0..LANES).map(|k| weights[k] * seen[k]).sum::<f64>();
+                        filled = 0;
+                    }
                 }
             }
             k += 2;

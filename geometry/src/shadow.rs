@@ -74,6 +74,22 @@ struct Shadow<'a> {
     fronts: [Range<usize>; 2],
 }
 
+/// What bounds a shadow seen from any point of a receiver.
+#[derive(Debug, Clone, Copy)]
+pub enum Border {
+    /// The plane through the point and an edge; `inward` (from - x) x (to - x) points to the hidden side.
+    Edge {
+        /// Start of the edge.
+        from: DVec3,
+        /// End of the edge.
+        to: DVec3,
+        /// 1 or -1.
+        inward: f64,
+    },
+    /// A front face: what lies behind it is hidden.
+    Front(Plane),
+}
+
 /// A half-space of the view from a point: the r (from the point) with normal . r + offset >= 0.
 #[derive(Debug, Clone, Copy)]
 pub struct HalfSpace {
@@ -317,6 +333,33 @@ impl<'a> Shadows<'a> {
             if height > 0.0 {
                 out.push(HalfSpace { normal: -face.normal, offset: -height });
             }
+        }
+        true
+    }
+
+    /// The borders of what shadow `at` hides, where they are the same for all points of the receiver; `false` where they
+    /// are not.
+    pub fn borders(&self, at: usize, from: From, out: &mut Vec<Border>) -> bool {
+        out.clear();
+        let shadow = &self.list[at];
+        let standings = &self.standings[shadow.standings[from as usize].clone()];
+        if shadow.body.is_flat() && standings[0] == 0 {
+            return false;
+        }
+        for &k in &self.edges[shadow.edges[from as usize].clone()] {
+            let edge = &shadow.body.edges[k as usize];
+            let (left, right) = (standings[edge.left], standings[edge.right]);
+            if left * right != -1 {
+                return false;
+            }
+            let inward = if left == 1 { -1.0 } else { 1.0 };
+            out.push(Border::Edge { from: edge.from, to: edge.to, inward });
+        }
+        for &k in &self.fronts[shadow.fronts[from as usize].clone()] {
+            if standings[k as usize] == 0 {
+                return false;
+            }
+            out.push(Border::Front(shadow.body.faces[k as usize]));
         }
         true
     }
