@@ -1,4 +1,5 @@
 //! The matrix file: the exchange matrix S = diag(A) F, symmetric, stored once, as blocks over the cluster order.
+//! A matrix that is not symmetric (measured or computed elsewhere) has blocks on both sides of the diagonal.
 //!
 //! Element pairs whose entry is zero by proof are in no block. A file may hold only part of the blocks.
 
@@ -243,7 +244,7 @@ impl Matrix {
         self.file.counted_section("row_errors", self.element_count())
     }
 
-    /// Calls `visit(i, j, S_ij)` for every stored entry, each pair once with i <= j.
+    /// Calls `visit(i, j, S_ij)` for every stored entry: each pair once with i <= j where the matrix is symmetric.
     pub fn for_each(&self, mut visit: impl FnMut(usize, usize, f64)) -> Result<()> {
         let values = self.values()?;
         for block in self.blocks()? {
@@ -266,10 +267,11 @@ impl Matrix {
     /// Row sums of F: 1 in a closed scene, less by the share that escapes in an open one.
     pub fn row_sums(&self) -> Result<Vec<f64>> {
         let areas = self.areas()?;
+        let mirrored = self.record().symmetric;
         let mut sums = vec![0.0; self.element_count()];
         self.for_each(|i, j, s| {
             sums[i] += s;
-            if i != j {
+            if mirrored && i != j {
                 sums[j] += s;
             }
         })?;
@@ -286,10 +288,9 @@ impl Matrix {
             let found = format!("part {} of {}", record.part, record.parts);
             return refuse("header", found, "a whole matrix", "compute the matrix in one file");
         }
-        if !record.symmetric || record.extended {
-            let found = format!("symmetric {}, extended {}", record.symmetric, record.extended);
+        if record.extended {
             let remedy = "this program is older than the file: update it";
-            return refuse("header", found, "symmetric true, extended false", remedy);
+            return refuse("header", "extended true".into(), "extended false", remedy);
         }
         Ok(())
     }
@@ -313,16 +314,20 @@ impl Matrix {
             })?;
             let rows_end = u64::from(block.row_start) + u64::from(block.rows);
             let columns_end = u64::from(block.column_start) + u64::from(block.columns);
-            let ordered = match kind {
-                BlockKind::Dense => rows_end <= u64::from(block.column_start),
-                BlockKind::Triangle => block.row_start == block.column_start && block.rows == block.columns,
+            let (ordered, place) = match (kind, self.record().symmetric) {
+                (BlockKind::Dense, true) => {
+                    (rows_end <= u64::from(block.column_start), "a place above the diagonal of")
+                }
+                (BlockKind::Dense, false) => (true, "a place within"),
+                (BlockKind::Triangle, true) => {
+                    let square = block.row_start == block.column_start && block.rows == block.columns;
+                    (square, "a square on the diagonal of")
+                }
+                (BlockKind::Triangle, false) => (false, "dense blocks, as the matrix is not symmetric, of"),
             };
             if rows_end > elements || columns_end > elements || !ordered {
-                return Err(self.file.damaged(
-                    &part,
-                    format!("{block:?}"),
-                    format!("a place above the diagonal of {elements} rows"),
-                ));
+                let expected = format!("{place} {elements} rows");
+                return Err(self.file.damaged(&part, format!("{block:?}"), expected));
             }
             if block.offset != stored {
                 return Err(self.file.damaged(
