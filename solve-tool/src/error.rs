@@ -34,6 +34,14 @@ pub enum SolveError {
         /// What to do.
         remedy: &'static str,
     },
+    /// A method that a matrix without symmetry cannot be given to.
+    #[error(
+        "--solver {solver} needs a symmetric matrix, and this one is not; use --solver gmres (or auto), which takes any"
+    )]
+    NeedsSymmetry {
+        /// Name of the method.
+        solver: String,
+    },
     /// A direct solve that would not fit into memory.
     #[error(
         "--solver direct factors a dense matrix of {unknowns} unknowns, at most {most} are taken (its time grows with \

@@ -7,9 +7,6 @@
 //!
 //! in the power norm: row error times rho / (1 - rho) where rho is uniform, as the furnace shows exactly.
 
-use crate::bound::Amplification;
-use crate::system::System;
-
 /// What the matrix's errors mean for one channel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct MatrixError {
@@ -21,24 +18,32 @@ pub struct MatrixError {
     pub amplification: f64,
 }
 
-/// Effect of the matrix's row errors on the radiosity `radiosity` of a channel.
-pub fn matrix_error(
-    system: &System<'_>,
-    reflectance: &[f64],
-    radiosity: &[f64],
-    amplification: &Amplification,
-) -> MatrixError {
-    let (mut wrong, mut power) = (0.0, 0.0);
-    for (i, b) in radiosity.iter().enumerate() {
-        wrong += system.areas[i] * b.abs() * system.row_errors[i];
-        power += system.areas[i] * b.abs();
+/// What a part of the scene, solved by itself, has to do with the matrix's errors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PartPower {
+    /// |(I - K)^-1| there.
+    pub factor: f64,
+    /// Its largest reflectance.
+    pub brightest: f64,
+    /// Power that its row errors misplace, sum of A e B, W.
+    pub wrong: f64,
+}
+
+/// Effect of the matrix's row errors on a channel of which the elements send `power`, sum of A B, in W.
+pub fn matrix_error(parts: &[PartPower], power: f64) -> MatrixError {
+    let wrong: f64 = parts.iter().map(|part| part.wrong).sum();
+    // A black part amplifies nothing, whatever else is known.
+    let factor = |part: &PartPower| if part.brightest > 0.0 { part.factor * part.brightest } else { 0.0 };
+    let changed: f64 = parts
+        .iter()
+        .filter(|part| part.wrong > 0.0 && part.brightest > 0.0)
+        .map(|part| factor(part) * part.wrong)
+        .sum();
+    let largest = parts.iter().map(factor).fold(0.0, f64::max);
+    if power == 0.0 || wrong == 0.0 {
+        return MatrixError { relative: 0.0, row_error: 0.0, amplification: largest };
     }
-    let brightest = reflectance.iter().copied().fold(0.0, f64::max);
-    let row_error = if power > 0.0 { wrong / power } else { 0.0 };
-    // A black scene amplifies nothing, whatever else is known.
-    let factor = if brightest > 0.0 { amplification.factor * brightest } else { 0.0 };
-    let relative = if row_error > 0.0 { factor * row_error } else { 0.0 };
-    MatrixError { relative, row_error, amplification: factor }
+    MatrixError { relative: changed / power, row_error: wrong / power, amplification: changed / wrong }
 }
 
 /// What to tell the user where the matrix is not good enough for the asked error: `asked` is solve-tool's

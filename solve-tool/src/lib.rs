@@ -23,13 +23,13 @@
 //! ```
 //!
 //! # Limitations
-//! The matrix must be whole (one part) and symmetric. Diffuse reflection only; channels do not mix.
+//! The matrix must be whole (one part). Diffuse reflection only; channels do not mix.
 
+pub mod account;
+pub mod bounces;
 pub mod bound;
-mod cg;
 pub mod channels;
 pub mod components;
-mod direct;
 pub mod energy;
 mod equation;
 pub mod error;
@@ -38,7 +38,13 @@ pub mod export;
 pub mod info;
 mod kernel;
 pub mod lossless;
+pub mod method;
+mod part;
 pub mod product;
 pub mod run;
+pub mod skips;
+pub mod snapshot;
 pub mod solve;
+pub mod start;
 pub mod system;
+pub mod work;

@@ -1,9 +1,11 @@
 //! Command line of solve-tool.
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use interchange::grouping::By;
 use interchange::tool::{Common, EXIT_CODES, Finish, exit_code, positive, print_data};
 use solve_tool::run::SolveRequest;
+use solve_tool::skips::{Skip, Skips};
+use solve_tool::snapshot::Plan;
 use solve_tool::solve::Solver;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -36,6 +38,24 @@ enum Command {
         /// Method
         #[arg(long, value_enum, default_value_t = Solver::Auto)]
         solver: Solver,
+        /// Stop after K reflections of every ray (0: emission alone) instead of solving
+        #[arg(long, value_name = "K", conflicts_with_all = ["solver", "tolerance", "start", "snapshots", "max_steps"])]
+        bounces: Option<u32>,
+        /// Write a solution after every N steps (southwell: shots), or after those in a list, beside the output
+        #[arg(long, value_name = "N[,N...]", value_parser = Plan::parse)]
+        snapshots: Option<Plan>,
+        /// Older solution on the same mesh to start from
+        #[arg(long, value_name = "SOL")]
+        start: Option<PathBuf>,
+        /// With southwell: elements pass on at once what the balance of power foresees
+        #[arg(long)]
+        overshoot: bool,
+        /// Give up after N steps, each as long as a product with the matrix
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+        max_steps: Option<u64>,
+        /// Do work that is known to change nothing; several with commas between
+        #[arg(long, value_name = "NAME", value_enum, value_delimiter = ',')]
+        no_skip: Vec<Skip>,
         /// Error to be proved, relative to the emitted power: sum of A |error of B| over sum of A E
         #[arg(long, value_name = "E", default_value = "1e-6", value_parser = positive)]
         tolerance: f64,
@@ -72,8 +92,38 @@ fn main() -> ExitCode {
 
 fn run(command: Command) -> anyhow::Result<Finish> {
     match command {
-        Command::Solve { matrix, mesh, materials, output, solver, tolerance } => {
-            let request = SolveRequest { matrix, mesh, materials, output, solver, tolerance };
+        Command::Solve {
+            matrix,
+            mesh,
+            materials,
+            output,
+            solver,
+            bounces,
+            snapshots,
+            start,
+            overshoot,
+            max_steps,
+            no_skip,
+            tolerance,
+        } => {
+            if overshoot && solver != Solver::Southwell {
+                let message = "--overshoot goes with --solver southwell";
+                Cli::command().error(clap::error::ErrorKind::ArgumentConflict, message).exit();
+            }
+            let request = SolveRequest {
+                matrix,
+                mesh,
+                materials,
+                output,
+                solver,
+                tolerance,
+                bounces,
+                snapshots,
+                start,
+                overshooting: overshoot,
+                most_steps: max_steps.map(|steps| steps as usize),
+                skips: Skips { done: no_skip },
+            };
             return Ok(solve_tool::run::run(&request)?);
         }
         Command::Export { solution, mesh, by, output } => {

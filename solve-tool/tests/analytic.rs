@@ -4,6 +4,8 @@
 mod common;
 
 use common::{CUBE_ADJACENT, CUBE_OPPOSITE, Scene, assert_all_close, grey};
+use solve_tool::bounces::bounce;
+use solve_tool::skips::Skips;
 use solve_tool::solve::Solver;
 
 /// One-patch-per-face cube, ceiling emits 1, uniform reflectance: wall, floor, ceiling.
@@ -33,24 +35,65 @@ fn goral_like_cube() {
     assert_all_close(&b, &[right, left, 1.0, back, rest, rest], 1e-9);
 }
 
-/// Box 1 x 1 x 2: patches 0-1 and 2-3 opposite 1 x 2 sides, 4-5 the unit squares.
-fn box_1_1_2() -> Scene {
-    let s = |i: usize, j: usize| match (i.min(j), i.max(j)) {
-        (i, j) if i == j => 0.0,
-        (0, 1) | (2, 3) => 0.571750769701,
-        (4, 5) => 0.068589588819,
-        (_, 4 | 5) => 0.232852602795,
-        _ => 0.481272012354,
-    };
-    let areas = vec![2.0, 2.0, 2.0, 2.0, 1.0, 1.0];
-    let scaled = areas.clone();
-    Scene::new(areas, |i, j| s(i, j) / scaled[i])
+/// n x n patches a face, the ceiling emits: face means of wall, floor and ceiling for rho = 0.5, published with these n.
+#[test]
+fn subdivided_cube_with_a_glowing_ceiling() {
+    let table = [
+        (2, 0.181836268946, 0.173639114749, 1.099015809466),
+        (4, 0.181381216327, 0.171829422310, 1.102645712382),
+        (8, 0.181195523706, 0.171373223526, 1.103844681651),
+    ];
+    for (n, wall, floor, ceiling) in table {
+        let scene = Scene::cube_grid(n);
+        let per_face = n * n;
+        let e: Vec<f64> = (0..scene.len()).map(|i| if i / per_face == 5 { 1.0 } else { 0.0 }).collect();
+        let b = scene.radiosity(&vec![0.5; scene.len()], &e);
+        let mean = |face: usize| b[face * per_face..][..per_face].iter().sum::<f64>() / per_face as f64;
+        for (face, want) in [(0, wall), (1, wall), (2, wall), (3, wall), (4, floor), (5, ceiling)] {
+            assert!((mean(face) - want).abs() < 1e-9, "n {n}, face {face}: {} for {want}", mean(face));
+        }
+    }
+}
+
+/// Partial sums on the cube, one patch a face: wall, floor, ceiling after 0, 1, 2, 3, 5, 10 bounces.
+#[test]
+fn bounces_are_partial_sums() {
+    let half = [
+        (0, 0.0, 0.0, 1.0),
+        (1, 0.100021888038, 0.099912447849, 1.0),
+        (2, 0.140017507556, 0.139929960196, 1.050000009582),
+        (3, 0.161018165060, 0.160927333055, 1.070000006707),
+        (5, 0.176628088308, 0.176537639584, 1.085700007186),
+        (10, 0.181673508528, 0.181583065690, 1.090746337699),
+    ];
+    let bright = [
+        (1, 0.160035020860, 0.159859916559, 1.0),
+        (3, 0.348442499962, 0.348309987398, 1.209920012753),
+        (10, 0.618098405381, 0.617968282233, 1.480141366642),
+    ];
+    let rows = half.map(|row| (0.5, row)).into_iter().chain(bright.map(|row| (0.8, row)));
+    for (rho, (bounces, wall, floor, ceiling)) in rows {
+        Scene::cube().with_system(|system| {
+            let channels = grey(&[rho; 6], &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+            let solved = bounce(system, &channels, bounces, &Skips::default());
+            assert_eq!(solved.counter("products"), bounces as usize);
+            let channel = &solved.channels[1];
+            assert_all_close(&channel.radiosity, &[wall, wall, wall, wall, floor, ceiling], 1e-9);
+            // What one bounce more would bring is under way: rho to the power of k of all, in a closed room.
+            assert!(channel.energy.defect < 1e-12, "{:?}", channel.energy);
+            assert!(
+                (channel.energy.under_way - rho.powi(bounces as i32)).abs() < 1e-12,
+                "{:?}",
+                channel.energy
+            );
+        });
+    }
 }
 
 #[test]
 fn box_with_unequal_areas() {
     let rho = [0.8, 0.3, 0.6, 0.6, 0.5, 0.7];
-    let b = box_1_1_2().radiosity(&rho, &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    let b = Scene::box_1_1_2().radiosity(&rho, &[0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
     let want =
         [0.186558327450, 0.079169333763, 0.147421942927, 0.147421942927, 0.102863001806, 1.096310112350];
     // The factors are given to 12 digits; errors of 5e-13 in them are amplified by at most 5.

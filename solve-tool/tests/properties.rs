@@ -62,7 +62,7 @@ fn importance_bounds_what_the_norm_cannot() {
     scene.with_system(|system| {
         let seen = system.product.apply(&[&rho]).swap_remove(0);
         assert_eq!(Amplification::from_norm(system.areas, &rho, &seen).proof, Proof::None);
-        let found = Amplification::find(system, &rho, &seen);
+        let (found, _) = Amplification::find(&system.product, system.areas, &rho, &seen);
         assert_eq!(found.proof, Proof::Importance);
         // The exact importance, by plain iteration of z = 1 + F (rho z).
         let mut z = [1.0; 4];
