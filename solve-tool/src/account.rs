@@ -1,11 +1,14 @@
 //! What the report says of a solution: bounds, errors, energy, counters; and why a tolerance was missed.
 
+use crate::bounds::Bounded;
 use crate::channels::CHANNEL_NAMES;
 use crate::error_budget::shortfall;
 use crate::solve::Solved;
 use crate::system::System;
 use crate::work::End;
+use interchange::ids::ElementId;
 use interchange::matrix::Matrix;
+use interchange::mesh::Mesh;
 use interchange::report::Report;
 
 /// The largest bound of the channels.
@@ -35,6 +38,46 @@ pub fn fill(report: &mut Report, solved: &Solved, system: &System<'_>, matrix: &
     }
     for warning in &solved.warnings {
         report.warn(warning.as_str());
+    }
+}
+
+/// Elements and links named in the report; all are in the solution file.
+const NAMED: usize = 20;
+
+/// Adds bounds, the three terms of error and the worst elements and links.
+pub fn fill_bounds(report: &mut Report, bounded: &Bounded, mesh: &Mesh) {
+    report.count("products for upper and lower bounds", bounded.products);
+    for (c, name) in CHANNEL_NAMES.iter().enumerate() {
+        let terms = &bounded.terms[c];
+        for (what, term) in
+            [("matrix", terms.matrix), ("solver", terms.solver), ("discretisation", terms.discretisation)]
+        {
+            report.estimate(&format!("error by {what} {name}, power norm"), term.power);
+            report.estimate(&format!("error by {what} {name}, sup norm"), term.sup);
+        }
+        let widths = bounded.lower[c].iter().zip(&bounded.upper[c]).map(|(lower, upper)| upper - lower);
+        report.estimate(&format!("widest bounds {name}"), widths.fold(0.0, f64::max));
+        let unbounded = bounded.upper[c].iter().filter(|upper| upper.is_infinite()).count();
+        report.count("radiosities without upper bound", unbounded);
+        if unbounded > 0 {
+            report.warn(format!(
+                "{name} channel: errors of the matrix may grow without bound by interreflection; the upper bounds are \
+                 infinite; run formfactor-tool compute with a smaller --tolerance"
+            ));
+        }
+    }
+    let place = |i: u32| {
+        let element = ElementId(i);
+        let face = mesh.face_inputs[mesh.element_face(element).index()] + 1;
+        format!("element {} of face {face}, {}", i + 1, mesh.groups[mesh.element_group(element).index()])
+    };
+    for (rank, &i) in bounded.ranking.iter().take(NAMED).enumerate() {
+        let sum: f64 = bounded.element_errors[i as usize].iter().sum();
+        report.estimate(&format!("worst element {:02}: {}", rank + 1, place(i)), sum);
+    }
+    for (rank, link) in bounded.links.iter().take(NAMED).enumerate() {
+        let name = format!("worst link {:02}: {} to {}", rank + 1, place(link.first), place(link.second));
+        report.estimate(&name, link.error);
     }
 }
 

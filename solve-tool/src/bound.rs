@@ -71,6 +71,13 @@ impl Amplification {
     }
 }
 
+/// How far the solution of a perturbed system is from that of B = E + K B: with |dK| = `perturbation`, |dK B| =
+/// `change` and |K| = `norm` in any norm, at most change / (1 - norm - perturbation); infinite where that proves nothing.
+pub fn perturbed(norm: f64, perturbation: f64, change: f64) -> f64 {
+    let left = 1.0 - norm - perturbation;
+    if left > 0.0 { change / left } else { f64::INFINITY }
+}
+
 /// z > 0 on the elements that reflect with z - S^T (rho z) / A >= least > 0, checked: a residual of power p at element i
 /// changes the radiosity by at most p z_i / least in all.
 #[derive(Debug, Clone)]

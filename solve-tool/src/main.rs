@@ -3,6 +3,7 @@
 use clap::{CommandFactory, Parser, Subcommand};
 use interchange::grouping::By;
 use interchange::tool::{Common, EXIT_CODES, Finish, exit_code, positive, print_data};
+use solve_tool::interval::Spread;
 use solve_tool::run::SolveRequest;
 use solve_tool::skips::{Skip, Skips};
 use solve_tool::snapshot::Plan;
@@ -53,6 +54,11 @@ enum Command {
         /// Give up after N steps, each as long as a product with the matrix
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
         max_steps: Option<u64>,
+        /// Bound every radiosity from below and above, and tell the errors of matrix, solver and elements apart; the
+        /// value says how the errors of a row of the matrix are spread
+        #[arg(long, value_name = "SPREAD", value_enum, num_args = 0..=1, require_equals = true,
+            default_missing_value = "rows", conflicts_with = "bounces")]
+        bounds: Option<Spread>,
         /// Do work that is known to change nothing; several with commas between
         #[arg(long, value_name = "NAME", value_enum, value_delimiter = ',')]
         no_skip: Vec<Skip>,
@@ -103,6 +109,7 @@ fn run(command: Command) -> anyhow::Result<Finish> {
             start,
             overshoot,
             max_steps,
+            bounds,
             no_skip,
             tolerance,
         } => {
@@ -123,6 +130,7 @@ fn run(command: Command) -> anyhow::Result<Finish> {
                 overshooting: overshoot,
                 most_steps: max_steps.map(|steps| steps as usize),
                 skips: Skips { done: no_skip },
+                bounds,
             };
             return Ok(solve_tool::run::run(&request)?);
         }

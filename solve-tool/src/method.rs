@@ -88,3 +88,8 @@ pub(crate) fn method<'a>(
         Solver::Cg | Solver::Auto => Box::new(ConjugateGradients { deflated: setup.deflated }),
     })
 }
+
+/// Conjugate gradients, or what a matrix without symmetry needs.
+pub(crate) fn of_any(symmetric: bool) -> Box<dyn Method> {
+    if symmetric { Box::new(ConjugateGradients { deflated: true }) } else { Box::new(gmres::Gmres) }
+}

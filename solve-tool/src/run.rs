@@ -2,8 +2,11 @@
 
 use crate::account;
 use crate::bounces::bounce;
+use crate::bounds::{self, Bounded};
 use crate::channels::{self, Channel};
+use crate::discretisation::{self, ElementResidual, Radiosities};
 use crate::error::{Result, SolveError};
+use crate::interval::Spread;
 use crate::lossless::Lossless;
 use crate::skips::Skips;
 use crate::snapshot::{self, Plan};
@@ -55,6 +58,8 @@ pub struct SolveRequest {
     pub most_steps: Option<usize>,
     /// Work that is left out.
     pub skips: Skips,
+    /// Whether to bound every radiosity, and how the matrix's errors are spread.
+    pub bounds: Option<Spread>,
 }
 
 impl SolveRequest {
@@ -71,6 +76,9 @@ impl SolveRequest {
         }
         if let Some(steps) = self.most_steps {
             flags.push(format!("--max-steps {steps}"));
+        }
+        if let Some(spread) = self.bounds {
+            flags.push(format!("--bounds {}", spread.name()));
         }
         flags.extend(self.skips.done.iter().map(|skip| format!("--no-skip {}", skip.name())));
         flags
@@ -111,12 +119,23 @@ pub fn run(request: &SolveRequest) -> Result<Finish> {
     let system = report.phase("row sums", || System::new(&matrix))?;
     let scene = Scene { request, channels: &channels, system: &system, provenance, origins };
     let solved = report.phase("solve", || scene.solve(start.map(|start| start.irradiance)));
-    let solved = solved.map_err(|error| name_places(error, &mesh))?;
+    let mut solved = solved.map_err(|error| name_places(error, &mesh))?;
+    let bounded = match request.bounds {
+        Some(spread) => {
+            let residuals = report.phase("test points", || scene.residuals(&mesh, &solved));
+            Some(report.phase("bounds", || bounds::find(&system, &channels, &solved, &residuals, spread)))
+        }
+        None => None,
+    };
+    report.phase("sharpen", || scene.sharpen(&mut solved));
 
-    report.phase("write", || scene.write(&solved))?;
+    report.phase("write", || scene.write(&solved, bounded.as_ref()))?;
     report.flags = request.flags();
     report.flags.push(format!("solved by: {}", solved.method));
     account::fill(&mut report, &solved, &system, &matrix);
+    if let Some(bounded) = &bounded {
+        account::fill_bounds(&mut report, bounded, &mesh);
+    }
     let missed = match request.bounces {
         Some(_) => None,
         None => account::missed(&solved, request.tolerance, matrix.record().tolerance),
@@ -196,7 +215,35 @@ impl Scene<'_> {
         Details { exitance, row_sums: Some(self.system.row_sums.clone()), ..Details::default() }
     }
 
-    fn write(&self, solved: &Solved) -> Result<()> {
+    /// What is not constant on the elements, at test points.
+    fn residuals(&self, mesh: &Mesh, solved: &Solved) -> Vec<ElementResidual> {
+        let reflectance = interleave(|c| &self.channels[c].reflectance);
+        let exitance = interleave(|c| &self.channels[c].exitance);
+        let radiosity = interleave(|c| &solved.channels[c].radiosity);
+        let (reflectance, exitance, radiosity) = (&reflectance[..], &exitance[..], &radiosity[..]);
+        discretisation::residuals(mesh, Radiosities { reflectance, exitance, radiosity })
+    }
+
+    /// Looks closer at the matrix's errors where they are more than was asked.
+    fn sharpen(&self, solved: &mut Solved) {
+        if self.request.bounces.is_some() {
+            return;
+        }
+        let mut products = 0;
+        for c in 0..3 {
+            let earlier = (0..c).find(|&earlier| self.channels[earlier] == self.channels[c]);
+            if let Some(earlier) = earlier {
+                solved.channels[c].matrix_error = solved.channels[earlier].matrix_error;
+            } else if solved.channels[c].matrix_error.relative > self.request.tolerance {
+                products += bounds::sharpen(self.system, &self.channels[c], &mut solved.channels[c]);
+            }
+        }
+        if products > 0 {
+            solved.counters.push(("products for matrix errors".into(), products));
+        }
+    }
+
+    fn write(&self, solved: &Solved, bounded: Option<&Bounded>) -> Result<()> {
         // A dark channel has no history: its error is 0 throughout.
         let products = solved.channels.iter().map(|c| c.history.len()).max().unwrap_or(0);
         let at = |c: usize, k: usize| solved.channels[c].history.get(k).copied().unwrap_or(0.0);
@@ -209,7 +256,16 @@ impl Scene<'_> {
                 tolerance: self.request.tolerance,
                 achieved: account::worst_bound(solved),
             },
-            details: self.details(),
+            details: match bounded {
+                Some(bounded) => Details {
+                    bounds: Some([interleave(|c| &bounded.lower[c]), interleave(|c| &bounded.upper[c])]),
+                    element_errors: Some(bounded.element_errors.clone()),
+                    error_ranking: Some(bounded.ranking.clone()),
+                    error_links: Some(bounded.links.clone()),
+                    ..self.details()
+                },
+                None => self.details(),
+            },
         };
         solution.write(&self.request.output, self.provenance.clone(), self.origins)?;
         Ok(())

@@ -60,13 +60,7 @@ impl Scene {
     /// The unit cube with n x n elements a face, exact factors; the faces in the order x=0, x=1, y=0, y=1, z=0, z=1,
     /// element (a, b) of a face at a n + b.
     pub fn cube_grid(n: usize) -> Self {
-        let faces: Vec<Patch> = (0..6)
-            .flat_map(|face| {
-                let (axis, far) = (face / 2, face % 2 == 1);
-                grid(DVec3::ZERO, axis, if far { 1.0 } else { 0.0 }, !far, n).into_iter().flatten()
-            })
-            .collect();
-        Self::of_patches(&faces, &[])
+        Self::of_patches(&cube_patches(n), &[])
     }
 
     /// Two unit rooms side by side in x, n x n elements a face, and in the wall between them a door in place of one
@@ -171,6 +165,15 @@ impl Scene {
         assert_all_close(&cg, &direct, 1e-10 * largest);
         direct
     }
+}
+
+/// The patches of [`Scene::cube_grid`].
+pub fn cube_patches(n: usize) -> Vec<Patch> {
+    let face = |face: usize| {
+        let (axis, far) = (face / 2, face % 2 == 1);
+        grid(DVec3::ZERO, axis, if far { 1.0 } else { 0.0 }, !far, n).into_iter().flatten()
+    };
+    (0..6).flat_map(face).collect()
 }
 
 /// The n x n squares of the unit square at `height` along `axis`, from the corner `low`, looking up that axis or down.
