@@ -78,8 +78,8 @@ pub fn residuals_at(
                 gatherer.factors(point.position, plane.normal, scratch, &mut |j, factor| {
                     (0..3).for_each(|c| gathered[c] += factor * of.radiosity[j][c]);
                 });
-                for c in 0..3 {
-                    let sent = of.exitance[i][c] + of.reflectance[i][c] * gathered[c];
+                for (c, &gathered) in gathered.iter().enumerate() {
+                    let sent = of.exitance[i][c] + of.reflectance[i][c] * gathered;
                     let residual = sent - of.radiosity[i][c];
                     found.power[c] += point.weight * residual.abs();
                     found.largest[c] = found.largest[c].max(residual.abs());

@@ -53,6 +53,17 @@ pub enum SolveError {
         /// Limit.
         most: usize,
     },
+    /// Heat that is not there.
+    #[error(
+        "group {group}: its net flux of {flux} W m^-2 draws more heat out than arrives: its temperature would have to be \
+         below absolute zero; draw less, or heat another group"
+    )]
+    BelowZero {
+        /// Name of the group.
+        group: String,
+        /// Its net flux.
+        flux: f64,
+    },
     /// An emission beyond the range of f64.
     #[error("material {material}: Ke {radiance:?} times pi is not a finite number; use other units")]
     ExitanceTooLarge {

@@ -50,5 +50,6 @@ pub mod snapshot;
 pub mod solve;
 pub mod start;
 pub mod system;
+pub mod thermal;
 mod weighted;
 pub mod work;

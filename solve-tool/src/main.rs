@@ -3,6 +3,7 @@
 use clap::{CommandFactory, Parser, Subcommand};
 use interchange::grouping::By;
 use interchange::tool::{Common, EXIT_CODES, Finish, exit_code, positive, print_data};
+use solve_tool::export::{ExportRequest, Quantity, Units};
 use solve_tool::interval::Spread;
 use solve_tool::run::SolveRequest;
 use solve_tool::skips::{Skip, Skips};
@@ -33,6 +34,10 @@ enum Command {
         /// Material table or MTL file in place of the .materials beside the mesh
         #[arg(long, value_name = "FILE")]
         materials: Option<PathBuf>,
+        /// Heat: temperature and emissivity, or net flux, of every group, as a table with the header
+        /// group,emissivity,temperature,flux (K, W m^-2), in place of materials
+        #[arg(long, value_name = "CSV", conflicts_with = "materials")]
+        thermal: Option<PathBuf>,
         /// Solution to write (.sol)
         #[arg(long, short, value_name = "SOL")]
         output: PathBuf,
@@ -66,7 +71,7 @@ enum Command {
         #[arg(long, value_name = "E", default_value = "1e-6", value_parser = positive)]
         tolerance: f64,
     },
-    /// Write radiosity and irradiance as a table
+    /// Write a table: radiosity and irradiance, energy, bounds, errors or heat
     Export {
         /// Solution (.sol)
         solution: PathBuf,
@@ -76,6 +81,15 @@ enum Command {
         /// What a row stands for
         #[arg(long, value_enum)]
         by: By,
+        /// What it tells
+        #[arg(long, value_enum, default_value_t = Quantity::Radiosity)]
+        quantity: Quantity,
+        /// Units of radiosity and energy
+        #[arg(long, value_enum, default_value_t = Units::Radiometric)]
+        units: Units,
+        /// Luminous efficacy of the light for photometric units, lm/W (179: equal-energy white light)
+        #[arg(long, value_name = "LM_PER_W", default_value = "179", value_parser = positive)]
+        efficacy: f64,
         /// Table to write (.csv or .npy)
         #[arg(long, short, value_name = "TABLE")]
         output: PathBuf,
@@ -102,6 +116,7 @@ fn run(command: Command) -> anyhow::Result<Finish> {
             matrix,
             mesh,
             materials,
+            thermal,
             output,
             solver,
             bounces,
@@ -121,6 +136,7 @@ fn run(command: Command) -> anyhow::Result<Finish> {
                 matrix,
                 mesh,
                 materials,
+                thermal,
                 output,
                 solver,
                 tolerance,
@@ -134,8 +150,9 @@ fn run(command: Command) -> anyhow::Result<Finish> {
             };
             return Ok(solve_tool::run::run(&request)?);
         }
-        Command::Export { solution, mesh, by, output } => {
-            solve_tool::export::run(&solution, &mesh, by, &output)?;
+        Command::Export { solution, mesh, by, quantity, units, efficacy, output } => {
+            let request = ExportRequest { solution, mesh, by, quantity, units, efficacy, output };
+            solve_tool::export::run(&request)?;
         }
         Command::Info { file, json } => print_data(&solve_tool::info::describe(&file, json)?)?,
     }

@@ -13,6 +13,7 @@ use crate::snapshot::{self, Plan};
 use crate::solve::{Options, Solved, Solver, solve_with};
 use crate::start;
 use crate::system::System;
+use crate::thermal;
 use crate::work::Shown;
 use interchange::atomic_write::refuse_input;
 use interchange::materials_input::load_materials;
@@ -40,6 +41,8 @@ pub struct SolveRequest {
     pub mesh: PathBuf,
     /// Materials in place of the table beside the mesh.
     pub materials: Option<PathBuf>,
+    /// Temperatures and emissivities in place of materials.
+    pub thermal: Option<PathBuf>,
     /// The solution to be written.
     pub output: PathBuf,
     /// Method.
@@ -85,8 +88,9 @@ impl SolveRequest {
     }
 
     fn inputs(&self) -> impl Iterator<Item = &Path> {
-        let given = [Some(&self.matrix), Some(&self.mesh), self.materials.as_ref(), self.start.as_ref()];
-        given.into_iter().flatten().map(PathBuf::as_path)
+        let optional = [&self.materials, &self.thermal, &self.start].map(Option::as_ref);
+        let given = [Some(&self.matrix), Some(&self.mesh)].into_iter().chain(optional);
+        given.flatten().map(PathBuf::as_path)
     }
 }
 
@@ -97,9 +101,15 @@ pub fn run(request: &SolveRequest) -> Result<Finish> {
     let (mesh, _, mesh_digest) = report.phase("read mesh", || Mesh::read(&request.mesh))?;
     let matrix = report.phase("map matrix", || Matrix::open(&request.matrix))?;
     matrix.belongs_to(&request.mesh, mesh_digest, mesh.element_count())?;
-    let (materials, materials_digest) =
-        load_materials(&request.mesh, request.materials.as_deref(), &mesh.materials)?;
-    let channels = channels::of_mesh(&mesh, &materials)?;
+    let thermal = request.thermal.as_ref().map(|path| thermal::read(path, &mesh)).transpose()?;
+    let (channels, materials_digest) = match &thermal {
+        Some(table) => (std::array::from_fn(|_| table.channel(&mesh)), table.digest),
+        None => {
+            let given = request.materials.as_deref();
+            let (materials, digest) = load_materials(&request.mesh, given, &mesh.materials)?;
+            (channels::of_mesh(&mesh, &materials)?, digest)
+        }
+    };
     let start = request.start.as_ref();
     let start = start.map(|path| start::read(path, &request.mesh, &mesh, mesh_digest)).transpose()?;
 
@@ -110,7 +120,7 @@ pub fn run(request: &SolveRequest) -> Result<Finish> {
     provenance = provenance
         .input("mesh", mesh_digest)
         .input("matrix", matrix.digest())
-        .input("materials", materials_digest);
+        .input(if thermal.is_some() { "thermal" } else { "materials" }, materials_digest);
     if let Some(start) = &start {
         provenance = provenance.input("start", start.digest);
     }
@@ -129,7 +139,10 @@ pub fn run(request: &SolveRequest) -> Result<Finish> {
     };
     report.phase("sharpen", || scene.sharpen(&mut solved));
 
-    report.phase("write", || scene.write(&solved, bounded.as_ref()))?;
+    let temperatures =
+        thermal.map(|table| table.temperatures(&mesh, &solved.channels[0].irradiance)).transpose()?;
+    let details = scene.all_details(bounded.as_ref(), temperatures);
+    report.phase("write", || scene.write(&solved, details))?;
     report.flags = request.flags();
     report.flags.push(format!("solved by: {}", solved.method));
     account::fill(&mut report, &solved, &system, &matrix);
@@ -243,7 +256,22 @@ impl Scene<'_> {
         }
     }
 
-    fn write(&self, solved: &Solved, bounded: Option<&Bounded>) -> Result<()> {
+    /// What the solution holds besides.
+    fn all_details(&self, bounded: Option<&Bounded>, thermal: Option<Vec<[f64; 2]>>) -> Details {
+        let details = Details { thermal, ..self.details() };
+        match bounded {
+            Some(bounded) => Details {
+                bounds: Some([interleave(|c| &bounded.lower[c]), interleave(|c| &bounded.upper[c])]),
+                element_errors: Some(bounded.element_errors.clone()),
+                error_ranking: Some(bounded.ranking.clone()),
+                error_links: Some(bounded.links.clone()),
+                ..details
+            },
+            None => details,
+        }
+    }
+
+    fn write(&self, solved: &Solved, details: Details) -> Result<()> {
         // A dark channel has no history: its error is 0 throughout.
         let products = solved.channels.iter().map(|c| c.history.len()).max().unwrap_or(0);
         let at = |c: usize, k: usize| solved.channels[c].history.get(k).copied().unwrap_or(0.0);
@@ -256,16 +284,7 @@ impl Scene<'_> {
                 tolerance: self.request.tolerance,
                 achieved: account::worst_bound(solved),
             },
-            details: match bounded {
-                Some(bounded) => Details {
-                    bounds: Some([interleave(|c| &bounded.lower[c]), interleave(|c| &bounded.upper[c])]),
-                    element_errors: Some(bounded.element_errors.clone()),
-                    error_ranking: Some(bounded.ranking.clone()),
-                    error_links: Some(bounded.links.clone()),
-                    ..self.details()
-                },
-                None => self.details(),
-            },
+            details,
         };
         solution.write(&self.request.output, self.provenance.clone(), self.origins)?;
         Ok(())

@@ -37,10 +37,10 @@ fn split_bound(elements: &[Weighted]) -> f64 {
     let mut rest_size: f64 = order.iter().map(|e| e.budget * e.size).sum();
     let (mut apart_importance, mut apart_size) = (0.0, 0.0);
     let mut best = f64::INFINITY;
-    for k in 0..=n {
+    for (k, &rest_largest) in rest_largest.iter().enumerate() {
         let brightest_left = order.get(k).map_or(0.0, |e| e.size);
         let apart = largest * apart_size + brightest_left * apart_importance;
-        let rest = 0.5 * (brightest_left * rest_importance.max(0.0) + rest_largest[k] * rest_size.max(0.0));
+        let rest = 0.5 * (brightest_left * rest_importance.max(0.0) + rest_largest * rest_size.max(0.0));
         best = best.min(apart + rest);
         if let Some(next) = order.get(k) {
             apart_importance += next.budget * next.importance;

@@ -176,3 +176,28 @@ fn energy_is_accounted_for_in_open_and_closed_scenes() {
     let energy = solved.channels[2].energy;
     assert!(energy.escaped.abs() < 1e-12 && (energy.absorbed - 6.0).abs() < 1e-11, "{energy:?}");
 }
+
+/// Pinney and Bean's L-shaped room as the network of eight surfaces that is published, one of them cooler.
+#[test]
+fn l_shaped_room_of_eight_surfaces() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/reference/published/viewfactor_cases.json");
+    let all: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let case = &all["pinney_bean_L_room"];
+    let numbers = |value: &serde_json::Value| -> Vec<f64> {
+        value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+    };
+    let factors: Vec<Vec<f64>> = case["computed_F"].as_array().unwrap().iter().map(numbers).collect();
+    let areas = numbers(&case["areas"]);
+    // Both halves are given to eight digits: S is their mean.
+    let of = areas.clone();
+    let scene = Scene::new(areas, |i, j| 0.5 * (of[i] * factors[i][j] + of[j] * factors[j][i]) / of[i]);
+    let heat = &case["heat"];
+    let sigma = heat["sigma"].as_f64().unwrap();
+    let emissivity = case["emittance"].as_f64().unwrap();
+    let e: Vec<f64> = numbers(&heat["T_K"]).iter().map(|t| emissivity * sigma * t.powi(4)).collect();
+    let solved = scene.solve(&grey(&[1.0 - emissivity; 8], &e), Solver::Cg, 1e-12).unwrap();
+    let (b, h) = (&solved.channels[0].radiosity, &solved.channels[0].irradiance);
+    // Factors to 1.2e-6 of differences of up to 57 W m^-2 times eight surfaces; heat is given to 5e-6.
+    let received: Vec<f64> = h.iter().zip(b).map(|(h, b)| h - b).collect();
+    assert_all_close(&received, &numbers(&heat["computed_q_W_m2"]), 2e-4);
+}

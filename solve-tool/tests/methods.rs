@@ -108,7 +108,7 @@ fn steps_to_1e6(scene: &Scene, rho: &[f64], e: &[f64], solver: Solver, overshoot
     let mut reached = None;
     let mut view = |count: usize, look: &dyn Fn() -> [Shown; 3]| {
         // Looking at every shot would cost more than the shots.
-        if reached.is_some() || (solver == Solver::Southwell && count % 16 != 0) {
+        if reached.is_some() || (solver == Solver::Southwell && !count.is_multiple_of(16)) {
             return;
         }
         let [shown, ..] = look();
