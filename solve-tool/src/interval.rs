@@ -18,9 +18,9 @@ use crate::work::{End, Work};
 /// How row errors are spread over a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Spread {
-    /// As badly as can be: guaranteed
+    /// As badly as can be: the bounds hold if the row errors do
     Rows,
-    /// Evenly, each factor by the same share: narrower, no guarantee
+    /// Evenly, each factor by the same share: narrower, no proof
     Proportional,
 }
 

@@ -203,13 +203,18 @@ impl Scene<'_> {
                 std::array::from_fn(|c| self.channels[c].exitance[i] + reflected(c))
             })
             .collect();
+        let areas = self.system.areas;
+        let power =
+            |values: &[f64]| -> f64 { values.iter().zip(areas).map(|(b, area)| b.abs() * area).sum() };
+        // What is shown is no solution yet, and the ambient term in it no bound: what is left to be shot is told.
+        let left = (0..3).map(|c| power(&shown[c].unshot) / power(&self.channels[c].exitance));
+        let achieved = left.filter(|left| left.is_finite()).fold(0.0, f64::max);
         let solver = format!("{}, snapshot after {count}", self.request.solver.name());
         let solution = Solution {
             radiosity,
             irradiance,
             history: Vec::new(),
-            // What is shown is no solution yet, and the ambient term in it no bound.
-            summary: Summary { solver, tolerance: self.request.tolerance, achieved: f64::INFINITY },
+            summary: Summary { solver, tolerance: self.request.tolerance, achieved },
             details: Details {
                 unshot: Some(interleave(|c| &shown[c].unshot)),
                 ambient: Some(std::array::from_fn(|c| shown[c].ambient)),

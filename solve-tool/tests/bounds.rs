@@ -105,14 +105,12 @@ fn perturb(scene: &Scene, size: f64, concentrated: bool, seed: u64) -> (Scene, V
     let mut next = random(seed);
     let n = scene.len();
     let mut exchange = scene.exchange.clone();
-    for i in 0..n {
-        for j in i + 1..n {
-            // Everywhere a little, or in few entries much.
-            let off = if concentrated && next() < 0.9 { 0.0 } else { size * (2.0 * next() - 1.0) };
-            let entry = (exchange[i][j] * (1.0 + off)).max(0.0);
-            exchange[i][j] = entry;
-            exchange[j][i] = entry;
-        }
+    for (i, j) in (0..n).flat_map(|i| (i + 1..n).map(move |j| (i, j))) {
+        // Everywhere a little, or in few entries much.
+        let off = if concentrated && next() < 0.9 { 0.0 } else { size * (2.0 * next() - 1.0) };
+        let entry = (exchange[i][j] * (1.0 + off)).max(0.0);
+        exchange[i][j] = entry;
+        exchange[j][i] = entry;
     }
     let errors = (0..n)
         .map(|i| (0..n).map(|j| (exchange[i][j] - scene.exchange[i][j]).abs()).sum::<f64>() / scene.areas[i])
@@ -140,12 +138,12 @@ fn the_truth_lies_between_the_bounds_in_200_random_scenes() {
         let channels = grey(&rho, &e);
         let solved = wrong.solve(&channels, Solver::Cg, tolerance).unwrap();
         let found = wrong.with_system(|system| bounds::find(system, &channels, &solved, &[], Spread::Rows));
-        for i in 0..n {
+        for (i, exact) in exact.iter().enumerate() {
             let (lower, upper) = (found.lower[0][i], found.upper[0][i]);
             assert!(
-                lower <= exact[i] && exact[i] <= upper,
+                lower <= *exact && *exact <= upper,
                 "scene {seed}, element {i}: {lower} <= {} <= {upper}",
-                exact[i]
+                *exact
             );
             elements += 1;
             infinite += usize::from(upper.is_infinite());
@@ -195,8 +193,8 @@ fn bounds_hold_without_symmetry() {
     system_of(&entries(&|i, j| if (i + j) % 2 == 0 { wrong[i] } else { 1.0 }), &[0.011; 25], &mut |system| {
         let solved = solve(system, &channels, Solver::Auto, 1e-6).unwrap();
         let found = bounds::find(system, &channels, &solved, &[], Spread::Rows);
-        for i in 0..25 {
-            assert!(found.lower[0][i] <= exact[i] && exact[i] <= found.upper[0][i], "{i}");
+        for (i, &exact) in exact.iter().enumerate() {
+            assert!(found.lower[0][i] <= exact && exact <= found.upper[0][i], "{i}");
             assert!(found.upper[0][i] < 1.2 * found.lower[0][i], "{i}");
         }
     });
