@@ -1,9 +1,10 @@
-//! The matrix product on a 10,000 x 10,000 matrix against the machine's streaming read bandwidth, in this process, on
-//! all cores: `cargo bench -p solve-tool --bench product [-- ELEMENTS]`.
+//! The matrix product on a 10,000 x 10,000 matrix against the machine's streaming read bandwidth, in one process, on all
+//! cores: `cargo bench -p solve-tool --bench product [-- ELEMENTS]`.
 //!
 //! Half of S is stored and each stored entry is used twice, so a kernel that reads all of S would have to run at twice
-//! the rate to be as fast: the last column counts all of S. Best of several runs, as other work on the machine only
-//! ever takes time away.
+//! the rate to be as fast: `all of S` counts what it would have read. Streaming and product take turns, best of several
+//! rounds each, as other work on the machine only ever takes time away; rates are given per second of wall time and, for
+//! machines that are never quiet, per second of processor time (Linux tells it).
 #![allow(missing_docs)]
 
 use interchange::matrix::{Block, BlockKind, Values};
@@ -12,14 +13,35 @@ use solve_tool::product::Product;
 use std::hint::black_box;
 use std::time::Instant;
 
-const RUNS: usize = 15;
+const ROUNDS: usize = 12;
 
-fn best(mut work: impl FnMut()) -> f64 {
-    (0..RUNS).fold(f64::INFINITY, |best, _| {
-        let start = Instant::now();
-        work();
-        best.min(start.elapsed().as_secs_f64())
-    })
+/// Least wall and processor seconds of a piece of work.
+#[derive(Clone, Copy)]
+struct Best {
+    wall: f64,
+    processor: f64,
+}
+
+impl Best {
+    const NONE: Best = Best { wall: f64::INFINITY, processor: f64::INFINITY };
+
+    fn take(&mut self, mut work: impl FnMut()) {
+        // Three in a row: the system counts processor time in steps of some milliseconds.
+        let (wall, processor) = (Instant::now(), processor_seconds());
+        (0..3).for_each(|_| work());
+        self.wall = self.wall.min(wall.elapsed().as_secs_f64() / 3.0);
+        self.processor = self.processor.min((processor_seconds() - processor) / 3.0);
+    }
+}
+
+/// Processor time of all threads so far.
+fn processor_seconds() -> f64 {
+    let threads = std::fs::read_dir("/proc/self/task").into_iter().flatten().flatten();
+    let nanoseconds = |thread: std::fs::DirEntry| -> Option<f64> {
+        let text = std::fs::read_to_string(thread.path().join("schedstat")).ok()?;
+        text.split_whitespace().next()?.parse().ok()
+    };
+    threads.filter_map(nanoseconds).sum::<f64>() * 1e-9
 }
 
 /// Blocks of `side` rows and columns over the upper triangle.
@@ -38,15 +60,13 @@ fn blocks(elements: usize, side: usize) -> Vec<Block> {
     blocks
 }
 
-/// Sums 64-bit words as fast as they come: eight running sums in each of 64 runs.
+/// Adds 64-bit words as fast as they come, 32 running sums in each of 64 runs.
 fn stream(words: &[u64]) -> u64 {
     let run = |words: &[u64]| {
         let mut sums = [0u64; 32];
         let (chunks, _) = words.as_chunks::<32>();
         for chunk in chunks {
-            for lane in 0..32 {
-                sums[lane] = sums[lane].wrapping_add(chunk[lane]);
-            }
+            sums.iter_mut().zip(chunk).for_each(|(sum, word)| *sum = sum.wrapping_add(*word));
         }
         sums.iter().fold(0u64, |a, b| a.wrapping_add(*b))
     };
@@ -58,41 +78,52 @@ fn main() {
     let elements: usize = given.unwrap_or(10_000);
     let stored = elements * (elements + 1) / 2;
     let words = vec![1u64; stored / 2];
-    let bandwidth = words.len() as f64 * 8.0
-        / best(|| {
-            black_box(stream(black_box(&words)));
-        });
-    drop(words);
-    println!("{elements} elements, {} threads", rayon::current_num_threads());
-    println!("streaming read: {:.1} GB/s", bandwidth / 1e9);
-    println!("entries  right-hand sides  block side   stored GB/s  of streaming  all of S GB/s");
-    let report = |kind: &str, bytes: usize, sides: usize, side: usize, seconds: f64| {
-        let rate = (stored * bytes) as f64 / seconds;
-        let all = (elements * elements * bytes) as f64 / seconds;
-        let share = 100.0 * rate / bandwidth;
-        println!("{kind:7}  {sides:16}  {side:10}  {:11.1}  {share:10.0} %  {:13.1}", rate / 1e9, all / 1e9);
-    };
+    let single = vec![0.25f32; stored];
+    let double = vec![0.25f64; stored];
     let x = vec![vec![1.0; elements]; 3];
     let x: Vec<&[f64]> = x.iter().map(Vec::as_slice).collect();
-    let values = vec![0.25f32; stored];
-    for side in [elements, 256, 64] {
-        let blocks = blocks(elements, side);
-        let product = Product::from_parts(elements, &blocks, Values::F32(&values));
-        for sides in [1, 3] {
-            let seconds = best(|| {
-                black_box(product.apply(black_box(&x[..sides])));
+    let sides = [elements, 256, 64];
+    let blocks = sides.map(|side| blocks(elements, side));
+    let cases: Vec<(&str, usize, usize, usize)> = (0..3)
+        .flat_map(|side| [("f32", 4, side, 1), ("f32", 4, side, 3)])
+        .chain([("f64", 8, 0, 1), ("f64", 8, 0, 3)])
+        .collect();
+    let products: Vec<Product<'_>> = cases
+        .iter()
+        .map(|&(_, bytes, side, _)| {
+            let values = if bytes == 4 { Values::F32(&single) } else { Values::F64(&double) };
+            Product::from_parts(elements, &blocks[side], values)
+        })
+        .collect();
+
+    let mut streaming = Best::NONE;
+    let mut best = vec![Best::NONE; cases.len()];
+    for _ in 0..ROUNDS {
+        for ((&(.., count), product), best) in cases.iter().zip(&products).zip(&mut best) {
+            streaming.take(|| {
+                black_box(stream(black_box(&words)));
             });
-            report("f32", 4, sides, side, seconds);
+            best.take(|| {
+                black_box(product.apply(black_box(&x[..count])));
+            });
         }
     }
-    drop(values);
-    let values = vec![0.25f64; stored];
-    let blocks = blocks(elements, elements);
-    let product = Product::from_parts(elements, &blocks, Values::F64(&values));
-    for sides in [1, 3] {
-        let seconds = best(|| {
-            black_box(product.apply(black_box(&x[..sides])));
-        });
-        report("f64", 8, sides, elements, seconds);
+
+    let rate = |bytes: usize, seconds: f64| bytes as f64 / seconds / 1e9;
+    let read = words.len() * 8;
+    let (wall, processor) = (rate(read, streaming.wall), rate(read, streaming.processor));
+    println!("{elements} elements, {} threads", rayon::current_num_threads());
+    println!("streaming read: {wall:.1} GB/s, {processor:.1} GB per processor second");
+    println!("                            stored GB/s              all of S GB per");
+    println!("entries  vectors  blocks    wall       processor     processor second, of streaming");
+    for (&(kind, bytes, side, count), best) in cases.iter().zip(&best) {
+        let all = rate(elements * elements * bytes, best.processor);
+        println!(
+            "{kind:7}  {count:7}  {:6}  {:6.1}  {:12.1}  {all:16.1}  {:10.0} %",
+            sides[side],
+            rate(stored * bytes, best.wall),
+            rate(stored * bytes, best.processor),
+            100.0 * all / processor
+        );
     }
 }

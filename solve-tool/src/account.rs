@@ -7,7 +7,7 @@ use crate::solve::Solved;
 use crate::system::System;
 use crate::work::End;
 use interchange::ids::ElementId;
-use interchange::matrix::Matrix;
+use interchange::matrix::{Matrix, MatrixRecord};
 use interchange::mesh::Mesh;
 use interchange::report::Report;
 
@@ -24,6 +24,7 @@ pub fn fill(report: &mut Report, solved: &Solved, system: &System<'_>, matrix: &
         report.count(name, *amount);
     }
     report.estimate("matrix tolerance asked", matrix.record().tolerance);
+    report.estimate("row error by storage and summation", system.rounding);
     report.estimate("solver bound", worst_bound(solved));
     for (name, channel) in CHANNEL_NAMES.iter().zip(&solved.channels) {
         report.estimate(&format!("solver bound {name}"), channel.bound);
@@ -82,7 +83,7 @@ pub fn fill_bounds(report: &mut Report, bounded: &Bounded, mesh: &Mesh) {
 }
 
 /// Why the asked tolerance does not hold, if it does not: the solver's own bound first, else the matrix's errors.
-pub fn missed(solved: &Solved, tolerance: f64, matrix_tolerance: f64) -> Option<String> {
+pub fn missed(solved: &Solved, tolerance: f64, matrix: &MatrixRecord) -> Option<String> {
     let bounds = CHANNEL_NAMES.iter().zip(&solved.channels);
     let worst = bounds.max_by(|a, b| a.1.bound.total_cmp(&b.1.bound)).filter(|(_, c)| c.bound > tolerance);
     if let Some((name, channel)) = worst {
@@ -100,5 +101,5 @@ pub fn missed(solved: &Solved, tolerance: f64, matrix_tolerance: f64) -> Option<
     let errors = CHANNEL_NAMES.iter().zip(&solved.channels);
     let (name, channel) =
         errors.max_by(|a, b| a.1.matrix_error.relative.total_cmp(&b.1.matrix_error.relative))?;
-    shortfall(&channel.matrix_error, tolerance, matrix_tolerance, name)
+    shortfall(&channel.matrix_error, tolerance, matrix, name)
 }

@@ -151,7 +151,7 @@ pub fn run(request: &SolveRequest) -> Result<Finish> {
     }
     let missed = match request.bounces {
         Some(_) => None,
-        None => account::missed(&solved, request.tolerance, matrix.record().tolerance),
+        None => account::missed(&solved, request.tolerance, matrix.record()),
     };
     report.write_beside(&request.output)?;
     Ok(missed.map_or(Finish::Done, Finish::ToleranceMissed))

@@ -325,6 +325,9 @@ impl<'a> Run<'a> {
             counters.push((format!("rows without reflectance {name}"), black));
             unlit_elements += elements.filter(|&i| !is_reached(i)).count();
         }
+        if self.options.start.is_some() {
+            counters.push(("channels started from an older solution".into(), lit.len()));
+        }
         counters.push(("elements no light can reach".into(), unlit_elements));
         counters.push(("parts solved apart".into(), self.parts));
         counters.push(("products".into(), self.products));
