@@ -3,6 +3,7 @@
 #   make -f pipeline.mk                                   the Cornell box, into out/
 #   make -f pipeline.mk SCENE=path/name.obj OUT=folder    your scene, into folder/name.*
 #   make -f pipeline.mk ERROR=0.01                        a finer picture
+#   make -f pipeline.mk -j 4 SHARDS=4                     the matrix in four parts side by side
 #   make -f pipeline.mk test                              the tests
 #   make -f pipeline.mk clean SCENE=... OUT=...           removes what was made for this scene
 #
@@ -36,6 +37,8 @@ OUT   ?= out
 ERROR ?= 0.02
 # 1: a stage that misses its tolerance (exit 3) stops the pipeline. Otherwise it warns and the pipeline goes on.
 STRICT ?=
+# Above 1: the matrix is computed in so many parts, which make -j runs side by side, and merged; the file is the same.
+SHARDS ?= 1
 # Added to a stage's command. A flag given here replaces the one that follows from ERROR.
 MESH_FLAGS  ?=
 FF_FLAGS    ?=
@@ -78,6 +81,13 @@ unless = $(if $(filter $2 $(2:%=%=%),$1),,$3)
 mesh_flags  = $(call unless,$(MESH_FLAGS),--elements --max-edge,--elements $(word 1,$(derived))) $(MESH_FLAGS)
 ff_flags    = $(call unless,$(FF_FLAGS),--tolerance,--tolerance $(word 2,$(derived))) $(FF_FLAGS)
 solve_flags = $(call unless,$(SOLVE_FLAGS),--tolerance,--tolerance $(word 3,$(derived))) $(SOLVE_FLAGS)
+
+# Numbers of the shards; none where the matrix is computed in one piece.
+shards := $(shell printf '%s' $(call quoted,$(SHARDS)) | grep -qE '^[1-9][0-9]{0,3}$$' && seq $(SHARDS))
+ifeq ($(shards),)
+$(error pipeline.mk: SHARDS = $(SHARDS): expected a whole number from 1 to 9999)
+endif
+shards := $(if $(filter-out 1,$(shards)),$(shards))
 
 # The camera is the scene's toml where that has one; otherwise shade-tool frames the scene itself.
 TOML := $(wildcard $(basename $(SCENE)).toml)
@@ -174,9 +184,23 @@ $(P).mesh.made: $(call inputs,$(SCENE)) $(P).surfaces $(P).mesh.flags $(call nam
 $(P).mesh: $(P).mesh.made ; +
 
 # Form factors: what every element sees of every other.
+ifeq ($(shards),)
 $(P).ff.made: $(P).mesh $(P).ff.flags $(call named,$(FF_FLAGS)) \
     $(call program,FORMFACTOR_TOOL) $(call again,$(P).ff)
 	$(call stage,$(FORMFACTOR_TOOL) compute $(P).mesh -o $(P).ff $(ff_flags))
+else
+# The same in parts: name.1of4.ff and so on, and what puts them together.
+shard_files := $(shards:%=$(P).%of$(SHARDS).ff)
+define shard_rule
+$(P).$1of$(SHARDS).ff.made: $(P).mesh $(P).ff.flags $$(call named,$$(FF_FLAGS)) \
+    $$(call program,FORMFACTOR_TOOL) $$(call again,$(P).$1of$(SHARDS).ff)
+	$$(call stage,$$(FORMFACTOR_TOOL) compute $(P).mesh -o $(P).$1of$(SHARDS).ff --shard $1/$(SHARDS) $$(ff_flags))
+$(P).$1of$(SHARDS).ff: $(P).$1of$(SHARDS).ff.made ; +
+endef
+$(foreach i,$(shards),$(eval $(call shard_rule,$i)))
+$(P).ff.made: $(shard_files) $(call program,FORMFACTOR_TOOL) $(call again,$(P).ff)
+	$(call stage,$(FORMFACTOR_TOOL) merge $(shard_files) -o $(P).ff)
+endif
 $(P).ff: $(P).ff.made ; +
 
 # Solution: radiosity and irradiance of every element, with the materials beside the mesh.
@@ -228,3 +252,5 @@ clean:
 	rm -f $(outputs) $(outputs:%=%.report.json)
 	rm -f $(foreach s,$(stages),$(addprefix $(P).$s,.flags .made .made.start .made.new))
 	rm -f $(foreach f,$(outputs:$(P)%=$(hidden)%),$f.*.partial $f.report.json.*.partial $f.*.mode)
+	rm -f $(foreach e,.ff .ff.report.json .ff.made .ff.made.start .ff.made.new,$(P).[1-9]*of[1-9]*$e)
+	rm -f $(addprefix $(hidden).[1-9]*of[1-9]*.ff.,*.partial report.json.*.partial *.mode)

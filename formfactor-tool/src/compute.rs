@@ -1,18 +1,24 @@
 //! `compute`: a mesh file in, a matrix file out.
 
-use crate::counts::Counts;
+use crate::closure::{self, Closed};
 use crate::estimator::Estimator;
 use crate::exact::Exact;
+use crate::journal::{self, Journal, Run};
+use crate::options::{Shard, Storage};
+use crate::plan;
 use crate::scene::Scene;
+use crate::schedule::in_order;
+use crate::shards;
 use crate::skips::{Skip, Skips};
-use crate::store::{self, Assembled};
-use crate::tile::Tile;
+use crate::store::{Packing, Store, StoredTile};
 use crate::traversal::leaf_pairs;
 use interchange::atomic_write::refuse_input;
+use interchange::digest::Digest;
+use interchange::matrix::{BlockKind, MatrixRecord};
 use interchange::mesh::Mesh;
+use interchange::provenance::Provenance;
 use interchange::report::Report;
-use interchange::tool::{Common, Finish};
-use rayon::prelude::*;
+use interchange::tool::{Common, Finish, print_data};
 use std::path::PathBuf;
 
 /// What `compute` is asked for.
@@ -26,6 +32,8 @@ pub struct Request {
     pub tolerance: f64,
     /// Skips turned off.
     pub no_skip: Vec<Skip>,
+    /// How the matrix is stored.
+    pub storage: Storage,
 }
 
 /// Computes the matrix of a mesh and writes it with its report.
@@ -34,67 +42,145 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     let tolerance = request.tolerance;
     let skips = Skips::without(&request.no_skip);
     let mut report = Report::new("formfactor-tool", env!("CARGO_PKG_VERSION"));
-    report.flags.push(format!("--tolerance {tolerance}"));
+    let flags = std::iter::once(format!("--tolerance {tolerance}")).chain(request.storage.flags());
+    report.flags.extend(flags);
     let (mesh, _, digest) = report.phase("read", || Mesh::read(&request.mesh))?;
     let scene = report.phase("prepare", || Scene::new(&mesh, &skips))?;
     let (pairs, settled) = report.phase("traverse", || leaf_pairs(&scene, &skips));
 
-    let estimator = Exact::new(&scene, tolerance);
+    let estimator = report.phase("look", || Exact::new(&scene, &skips, &pairs, tolerance));
+    let shard = request.storage.shard.unwrap_or(Shard { part: 0, parts: 1 });
+    let all_pairs = pairs.len();
+    let pairs = shards::pairs_of(pairs, &estimator, shard);
+
+    let precision = request.storage.precision(tolerance);
+    let threads = rayon::current_num_threads();
+    let memory = plan::memory(&pairs, scene.len(), threads, plan::resident(), request.storage.memory)?;
+    if request.storage.dry_run {
+        print_data(&plan::describe(&scene, &pairs, &settled, &estimator, precision, memory, threads))?;
+        return Ok(Finish::Done);
+    }
+    if request.storage.memory.is_some() && !common.quiet {
+        eprintln!("formfactor-tool: memory: at most {}", plan::size(memory.bound));
+    }
+    let packing = Packing::new(&scene, &skips, precision, tolerance);
+    let record = MatrixRecord {
+        elements: scene.len() as u32,
+        mesh: digest,
+        precision,
+        symmetric: true,
+        extended: false,
+        tolerance,
+        part: shard.part,
+        parts: shard.parts,
+    };
+    let mut run_flags = report.flags.clone();
+    run_flags.extend(request.no_skip.iter().map(|skip| format!("--no-skip {skip:?}")));
+    let run = Run::new(digest.to_string(), run_flags, &pairs);
+    let begun = journal::begin(&request.output, &run, request.storage.resume)?;
+    begun.notice.iter().for_each(|notice| report.warn(notice.as_str()));
+    let origin = provenance(&report.flags, digest);
+    let mut store = Store::create(begun.work, origin, record, packing.areas())?;
+    store.writer.keep_when_dropped(request.storage.resume);
+    let (mut journal, resumed) = match begun.leftover {
+        None => (Journal::create(&request.output, &run)?, 0),
+        Some(leftover) => {
+            let (journal, tiles, damaged) =
+                report.phase("resume", || store.replay(leftover, &pairs, &run))?;
+            if damaged {
+                report.warn(format!(
+                    "the journal of the killed run is cut short or damaged after {tiles} tiles: the others are computed anew"
+                ));
+            }
+            (journal, tiles)
+        }
+    };
+    journal.keep_when_dropped(request.storage.resume);
+    // Parts count what whole clusters settled once.
+    if shard.part == 0 {
+        store.counts.same_plane += settled.same_plane;
+        store.counts.behind += settled.behind;
+        store.counts.covered += settled.covered;
+    }
     let bar = common.progress("form factors", pairs.len());
-    let tiles: Vec<Tile> = report.phase("pairs", || {
-        let compute = |pair| {
-            let tile = estimator.tile(pair);
+    bar.inc(resumed as u64);
+    report.phase("pairs", || {
+        let work = |k: usize| {
+            let tile = packing.pack(&pairs[k], &estimator.tile(&pairs[k]));
             bar.inc(1);
             tile
         };
-        pairs.par_iter().map(compute).collect()
-    });
+        let take = |k: usize, tile: StoredTile| {
+            store.add(&pairs[k], &tile)?;
+            journal.add(k, &tile, &mut store.writer)
+        };
+        let (budget, cost) = (memory.in_flight as usize, |k: usize| plan::tile_bytes(&pairs[k]) as usize);
+        in_order(resumed..pairs.len(), threads, budget, cost, work, take)
+    })?;
     bar.finish_and_clear();
 
-    let mut counts = Counts {
-        same_plane: settled.same_plane,
-        behind: settled.behind,
-        covered: settled.covered,
-        ..Counts::default()
+    // A shard alone says nothing of row sums.
+    let closed = match request.storage.shard {
+        None => report.phase("closure", || closure::close(&mut store, request.storage.closure))?,
+        Some(_) => None,
     };
-    tiles.iter().for_each(|tile| counts.add(&tile.counts));
-    let matrix = report.phase("assemble", || store::assemble(&scene, &pairs, &tiles, tolerance));
-    note(&mut report, &mesh, &scene, &matrix, &counts, tolerance);
+    note(&mut report, &mesh, &scene, &store);
+    note_rows(&mut report, &store, closed.as_ref(), tolerance);
+    estimator.note(&mut report);
     report.count("tests of occluders against shafts of clusters", settled.shaft_tests);
-    report.phase("write", || store::write(&request.output, digest, &matrix, tolerance))?;
+    report.count("tiles", pairs.len());
+    report.count("memory bound in bytes", memory.bound as usize);
+    report.count("tiles resumed", resumed);
+    report.count("tiles of other shards", all_pairs - pairs.len());
+    let finish = finish(tolerance, &store);
+    report.phase("write", || store.finish())?;
+    journal.remove();
     report.write_beside(&request.output)?;
-    Ok(finish(tolerance, &matrix))
+    Ok(finish)
+}
+
+/// Where a matrix with these flags comes from.
+fn provenance(flags: &[String], mesh: Digest) -> Provenance {
+    let origin = Provenance::new("formfactor-tool", env!("CARGO_PKG_VERSION"));
+    flags.iter().fold(origin, |origin, flag| origin.flag(flag.as_str())).input("mesh", mesh)
 }
 
 fn largest(values: &[f64]) -> f64 {
     values.iter().copied().fold(0.0, f64::max)
 }
 
-fn note(
-    report: &mut Report,
-    mesh: &Mesh,
-    scene: &Scene,
-    matrix: &Assembled,
-    counts: &Counts,
-    tolerance: f64,
-) {
+fn note(report: &mut Report, mesh: &Mesh, scene: &Scene, store: &Store) {
     let n = scene.len();
-    report.count("elements", n);
     report.count("occluders", mesh.occluders.len());
     report.count("occluders after merging", scene.occluders.len());
+    report.count("bodies that block", scene.bodies.len());
+    report.count("convex enclosure (all visibility skipped)", usize::from(scene.convex));
     report.count("pairs", n * (n + 1) / 2);
-    counts.note(report);
-    report.count("blocks", matrix.blocks.len());
-    report.count("blocks absent", matrix.absent_blocks);
-    report.estimate("tolerance asked", tolerance);
-    report.estimate("worst row error", largest(&matrix.row_errors));
-    report.estimate("mean row error", matrix.row_errors.iter().sum::<f64>() / n as f64);
-    report.estimate("largest row sum", largest(&matrix.row_sums));
-    report.estimate("smallest row sum", matrix.row_sums.iter().copied().fold(f64::INFINITY, f64::min));
+    store.counts.note(report);
+    report.count("blocks absent", store.absent_blocks);
 }
 
-fn finish(tolerance: f64, matrix: &Assembled) -> Finish {
-    let worst = largest(&matrix.row_errors);
+/// Notes what the rows of a finished matrix say.
+pub(crate) fn note_rows(report: &mut Report, store: &Store, closed: Option<&Closed>, tolerance: f64) {
+    let blocks = store.writer.blocks();
+    report.count("elements", store.areas.len());
+    report.count("blocks", blocks.len());
+    let sparse = blocks.iter().filter(|block| block.kind() == Ok(BlockKind::Sparse)).count();
+    report.count("blocks sparse", sparse);
+    let row_sums = store.row_sums();
+    report.estimate("tolerance asked", tolerance);
+    report.estimate("worst row error", largest(&store.row_errors));
+    report.estimate("mean row error", store.row_errors.iter().sum::<f64>() / row_sums.len() as f64);
+    report.estimate("largest row sum", largest(&row_sums));
+    report.estimate("smallest row sum", row_sums.iter().copied().fold(f64::INFINITY, f64::min));
+    if let Some(closed) = closed {
+        closed.note(report);
+    }
+}
+
+/// How a run with this tolerance ended.
+pub(crate) fn finish(tolerance: f64, store: &Store) -> Finish {
+    let worst = largest(&store.row_errors);
     if worst <= tolerance {
         return Finish::Done;
     }

@@ -1,11 +1,12 @@
 //! How many pairs each class had and what they cost: for the report.
 
-use geometry::pair::Class;
+use geometry::occluded::Effort;
 use geometry::unoccluded::Rule;
 use interchange::report::Report;
+use serde::{Deserialize, Serialize};
 
 /// Pairs of elements by class.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
     /// Of one plane.
     pub same_plane: usize,
@@ -21,28 +22,28 @@ pub struct Counts {
     pub visible_parts: usize,
     /// Occluded pairs whose evaluations ran out.
     pub exhausted: usize,
+    /// Pairs computed from both sides.
+    pub computed_twice: usize,
 }
 
 impl Counts {
-    /// Adds a pair of this class.
-    pub fn add_class(&mut self, class: Class) {
-        match class {
-            Class::Invisible => self.behind += 1,
-            Class::FullyBlocked => self.covered += 1,
-            Class::Unoccluded(rule) => match rule {
-                Rule::Invisible => self.behind += 1,
-                Rule::Centre => self.unoccluded[0] += 1,
-                Rule::Low => self.unoccluded[1] += 1,
-                Rule::Middle => self.unoccluded[2] += 1,
-                Rule::Product => self.unoccluded[3] += 1,
-                Rule::Contour => self.unoccluded[4] += 1,
-            },
-            Class::Occluded(effort) => {
-                self.occluded += 1;
-                self.visible_parts += effort.evaluations;
-                self.exhausted += usize::from(effort.exhausted);
-            }
+    /// Adds an unoccluded pair served by this rule.
+    pub fn add_unoccluded(&mut self, rule: Rule) {
+        match rule {
+            Rule::Invisible => self.behind += 1,
+            Rule::Centre => self.unoccluded[0] += 1,
+            Rule::Low => self.unoccluded[1] += 1,
+            Rule::Middle => self.unoccluded[2] += 1,
+            Rule::Product => self.unoccluded[3] += 1,
+            Rule::Contour => self.unoccluded[4] += 1,
         }
+    }
+
+    /// Adds a partly occluded pair.
+    pub fn add_occluded(&mut self, effort: Effort) {
+        self.occluded += 1;
+        self.visible_parts += effort.evaluations;
+        self.exhausted += usize::from(effort.exhausted);
     }
 
     /// Adds what another part counted.
@@ -56,6 +57,7 @@ impl Counts {
         self.occluded += other.occluded;
         self.visible_parts += other.visible_parts;
         self.exhausted += other.exhausted;
+        self.computed_twice += other.computed_twice;
     }
 
     /// Writes the counters into a report.
@@ -69,6 +71,7 @@ impl Counts {
         }
         report.count("pairs partly occluded", self.occluded);
         report.count("pairs partly occluded, out of evaluations", self.exhausted);
+        report.count("pairs computed from both sides", self.computed_twice);
         report.count("visible parts computed", self.visible_parts);
     }
 }

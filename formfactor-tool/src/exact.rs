@@ -1,21 +1,45 @@
 //! `--method auto`: every pair by the cheapest rule that keeps the tolerance, exact visible parts where something blocks.
+//!
+//! A row's tolerance is shared out in two halves: one to the pairs that see each other wholly, in proportion to their
+//! factors, one to the partly occluded pairs, in proportion to their factors without blockers. How much those add up to
+//! in each row is found first, by looking at all pairs without computing any.
 
+use crate::counts::Counts;
+use crate::descent::{Findings, descend};
 use crate::estimator::{Estimator, TileBuilder};
-use crate::scene::Scene;
+use crate::poses::Poses;
+use crate::scene::{Cluster, Scene};
+use crate::skips::{Skip, Skips};
 use crate::tile::Tile;
 use crate::traversal::LeafPair;
-use geometry::contour::Exchange;
-use geometry::occluder::Occluder;
-use geometry::pair::{self, Accuracy};
-use geometry::visible::Scratch;
+use geometry::area_rule::{Separation, kernel_sum};
+use geometry::contour::{Exchange, contour};
+use geometry::far::FarPatches;
+use geometry::occluded::Wanted;
+use geometry::pair::{InFront, Scratch};
+use geometry::patch::Patch;
+use geometry::unoccluded::{Facing, Rule, exchange_in_front, facing, mutual_parts};
+use glam::DVec3;
+use interchange::report::Report;
+use rayon::prelude::*;
+use std::f64::consts::PI;
+use std::ops::Range;
 
 /// Share of a row's error given to unoccluded pairs: their factors add up to at most 1.
-const UNOCCLUDED_SHARE: f64 = 0.5;
+const UNOCCLUDED_SHARE: f64 = 0.3;
 /// Unoccluded pairs are never asked less: they cost little, and in bright closed rooms what their rows miss of 1 counts
 /// 1 / (1 - rho) times.
 const UNOCCLUDED_LOOSEST: f64 = 2e-3;
-/// Share given to occluded pairs, relative to their factors without blockers, which add up to about 2 at most in rooms.
-const OCCLUDED_SHARE: f64 = 0.25;
+/// Share of a row's error given to partly occluded pairs.
+const OCCLUDED_SHARE: f64 = 0.7;
+/// A partly occluded pair that may take more than this part of a row's error has to keep its own.
+const DOMINANT_SHARE: f64 = 0.02;
+/// Estimates of the others are taken this many times: summed over a row they have been as low as 0.75 of the true error.
+const WARINESS: f64 = 2.0;
+/// So has one whose patches are this near (sizes over distance): what they see of each other is not smooth at a common edge.
+const NEAR: f64 = 0.7;
+/// Below this tolerance poses are not rounded: 1e-12 of a factor is to be had.
+const POSE_TOLERANCE: f64 = 1e-8;
 /// Most visible parts for one pair: a pair of whole walls behind a box needs some 10^5 for 12 digits.
 const MOST_EVALUATIONS: usize = 400_000;
 
@@ -23,66 +47,269 @@ const MOST_EVALUATIONS: usize = 400_000;
 #[derive(Debug)]
 pub struct Exact<'a> {
     scene: &'a Scene,
-    accuracy: Accuracy,
+    skips: &'a Skips,
+    /// Error asked of each row.
+    tolerance: f64,
+    /// Relative error of an unoccluded factor.
+    unoccluded: f64,
+    /// Per row: error of a partly occluded factor, relative to the factor without blockers.
+    occluded: Vec<f64>,
+    far: Far,
+    /// Near pairs by their pose, where the tolerance leaves room for a pose's rounding.
+    poses: Option<Poses>,
+}
+
+/// The patches as the rules for far pairs see them.
+#[derive(Debug)]
+struct Far {
+    low: FarPatches,
+    middle: FarPatches,
 }
 
 impl<'a> Exact<'a> {
     /// For rows within `tolerance`.
-    pub fn new(scene: &'a Scene, tolerance: f64) -> Self {
-        let accuracy = Accuracy {
-            unoccluded: (UNOCCLUDED_SHARE * tolerance).min(UNOCCLUDED_LOOSEST),
-            occluded: OCCLUDED_SHARE * tolerance,
-            // Over a row these shares add up to one more factor of 1.
-            least_factor: 1.0 / scene.len() as f64,
-            most_evaluations: MOST_EVALUATIONS,
-        };
-        Self { scene, accuracy }
+    pub fn new(scene: &'a Scene, skips: &'a Skips, pairs: &[LeafPair], tolerance: f64) -> Self {
+        let sizes = occluded_sizes(scene, skips, pairs);
+        let occluded = sizes.iter().map(|&size| OCCLUDED_SHARE * tolerance / size.max(tolerance)).collect();
+        let unoccluded = (UNOCCLUDED_SHARE * tolerance).min(UNOCCLUDED_LOOSEST);
+        let far = Far { low: FarPatches::low(&scene.patches), middle: FarPatches::middle(&scene.patches) };
+        let poses =
+            (tolerance >= POSE_TOLERANCE).then(|| Poses::new(unoccluded, skips.has(Skip::EqualPoses)));
+        Self { scene, skips, tolerance, unoccluded, occluded, far, poses }
+    }
+
+    fn one_way(&self, pair: &LeafPair) -> Tile {
+        let builder = TileBuilder::zeros(pair);
+        let mut filling = Filling { exact: self, pair, builder, pending: Vec::new(), too_near: Vec::new() };
+        let mut counts = Counts::default();
+        descend(self.scene, self.skips, pair, &mut filling, &mut counts, &mut Scratch::default());
+        *filling.builder.counts() = counts;
+        filling.builder.finish()
+    }
+
+    /// Exchange factor of two patches wholly in front of each other, by the contour whatever their distance.
+    fn contour(&self, p: &Patch, q: &Patch) -> Exchange {
+        let about = kernel_sum(&p.low, p.plane.normal, &q.low, q.plane.normal);
+        contour(&p.corners, &q.corners, self.unoccluded * about)
     }
 }
 
 impl Estimator for Exact<'_> {
     fn tile(&self, pair: &LeafPair) -> Tile {
-        let mut builder = TileBuilder::new(pair);
-        let (mut blockers, mut scratch) = (Vec::new(), Scratch::default());
-        for i in pair.rows.clone() {
-            let first = if pair.is_diagonal() { i } else { pair.columns.start };
-            for j in first..pair.columns.end {
-                let found = self.entry(i, j, pair, &mut builder, &mut blockers, &mut scratch);
-                builder.push(i - pair.rows.start, j - pair.columns.start, found.value, found.error);
-            }
+        let tile = self.one_way(pair);
+        if self.skips.has(Skip::Reciprocity) || pair.is_diagonal() {
+            return tile;
         }
-        builder.finish()
+        // S_ji computed too, and the mean kept: the same matrix, to rounding and the tolerance.
+        let [a, b] = pair.clusters;
+        let swapped = LeafPair {
+            rows: pair.columns.clone(),
+            columns: pair.rows.clone(),
+            clusters: [b, a],
+            blockers: pair.blockers.clone(),
+        };
+        mean(tile, &self.one_way(&swapped))
     }
 
     fn work(&self, pair: &LeafPair) -> f64 {
         pair.pairs() as f64 * (1.0 + pair.blockers.len() as f64)
     }
+
+    fn note(&self, report: &mut Report) {
+        let distinct = self.poses.as_ref().map_or(0, Poses::distinct);
+        report.count("different poses of near pairs (others skipped)", distinct);
+    }
 }
 
-impl<'a> Exact<'a> {
-    fn entry(
-        &self,
-        i: usize,
-        j: usize,
-        pair: &LeafPair,
-        builder: &mut TileBuilder,
-        blockers: &mut Vec<&'a Occluder>,
-        scratch: &mut Scratch,
-    ) -> Exchange {
-        let scene = self.scene;
-        if scene.faces[i] == scene.faces[j] {
-            builder.counts().same_plane += 1;
-            return Exchange::NONE;
+/// The mean of a tile and its transpose computed apart.
+fn mean(mut tile: Tile, transposed: &Tile) -> Tile {
+    let (rows, columns) = (tile.row_errors.len(), tile.column_errors.len());
+    for i in 0..rows {
+        for j in 0..columns {
+            let value = &mut tile.values[i * columns + j];
+            *value = 0.5 * (*value + transposed.values[j * rows + i]);
         }
-        let between = pair
-            .blockers
-            .iter()
-            .map(|&k| k as usize)
-            .filter(|&k| scene.sides[i].may_block(&scene.sides[j], k))
-            .map(|k| &scene.occluders[k]);
-        let (found, class) =
-            pair::exchange(&scene.patches[i], &scene.patches[j], between, self.accuracy, blockers, scratch);
-        builder.counts().add_class(class);
-        found
     }
+    tile.counts.computed_twice += rows * columns;
+    tile
+}
+
+/// Computes what the descent finds.
+struct Filling<'e> {
+    exact: &'e Exact<'e>,
+    pair: &'e LeafPair,
+    builder: TileBuilder,
+    pending: Vec<u32>,
+    too_near: Vec<u32>,
+}
+
+impl Filling<'_> {
+    fn set(&mut self, i: usize, j: usize, found: Exchange) {
+        let (row, column) = (i - self.pair.rows.start, j - self.pair.columns.start);
+        self.builder.set(row, column, found.value, found.error);
+    }
+
+    /// A row of pairs that see each other wholly: far ones together, those that are too near for a rule by the next one.
+    fn row_in_front(&mut self, i: usize, columns: Range<usize>, counts: &mut Counts) {
+        let relative = self.exact.unoccluded;
+        let mut pending = std::mem::take(&mut self.pending);
+        let mut too_near = std::mem::take(&mut self.too_near);
+        pending.clear();
+        pending.extend(columns.map(|j| j as u32));
+        let far = &self.exact.far;
+        for (patches, served) in [(&far.low, Rule::Low), (&far.middle, Rule::Middle)] {
+            too_near.clear();
+            patches.factors(i, &pending, |at, value, error| {
+                if error <= relative * value {
+                    counts.add_unoccluded(served);
+                    self.set(i, pending[at] as usize, Exchange { value, error });
+                } else {
+                    too_near.push(pending[at]);
+                }
+            });
+            std::mem::swap(&mut pending, &mut too_near);
+        }
+        for &j in &pending {
+            let (p, q) = (&self.exact.scene.patches[i], &self.exact.scene.patches[j as usize]);
+            let found = self.exact.poses.as_ref().and_then(|poses| poses.exchange(p, q));
+            let (found, rule) = found.unwrap_or_else(|| exchange_in_front(p, q, relative));
+            counts.add_unoccluded(rule);
+            self.set(i, j as usize, found);
+        }
+        (self.pending, self.too_near) = (pending, too_near);
+    }
+}
+
+impl Findings for Filling<'_> {
+    fn clear(&mut self, first: &Cluster, second: &Cluster, counts: &mut Counts) {
+        let (rows, columns) = (first.range.clone(), second.range.clone());
+        if first.faces(second) && second.faces(first) && self.exact.skips.has(Skip::FarRules) {
+            for i in rows {
+                self.row_in_front(i, columns.clone(), counts);
+            }
+            return;
+        }
+        let patches = &self.exact.scene.patches;
+        for i in rows {
+            for j in columns.clone() {
+                match facing(&patches[i], &patches[j]) {
+                    Facing::Away => counts.behind += 1,
+                    Facing::Full if self.exact.skips.has(Skip::FarRules) => {
+                        self.row_in_front(i, j..j + 1, counts)
+                    }
+                    Facing::Full => {
+                        let exchange = self.exact.contour(&patches[i], &patches[j]);
+                        counts.add_unoccluded(Rule::Contour);
+                        self.set(i, j, exchange);
+                    }
+                    Facing::Cut => match mutual_parts(&patches[i], &patches[j]) {
+                        None => counts.behind += 1,
+                        Some((p, q)) => {
+                            let (found, rule) = exchange_in_front(&p, &q, self.exact.unoccluded);
+                            counts.add_unoccluded(rule);
+                            self.set(i, j, found);
+                        }
+                    },
+                }
+            }
+        }
+    }
+
+    fn partial(
+        &mut self,
+        (i, j): (usize, usize),
+        pair: &InFront<'_>,
+        which: Range<usize>,
+        counts: &mut Counts,
+        scratch: &mut Scratch<'_>,
+    ) {
+        let unblocked = pair.unblocked_size();
+        let allowed = &self.exact.occluded;
+        let tolerance = allowed[i].min(allowed[j]) * unblocked;
+        let (p, q) = pair.patches();
+        let share = unblocked / p.area.min(q.area) * allowed[i].max(allowed[j]);
+        let near = Separation::new(p, q).theta > NEAR;
+        let alone = near || share > DOMINANT_SHARE * self.exact.tolerance;
+        let wanted = Wanted { tolerance, unblocked, alone, most_evaluations: MOST_EVALUATIONS };
+        let (found, effort) = pair.occluded(which, wanted, scratch);
+        counts.add_occluded(effort);
+        let wariness = if alone { 1.0 } else { WARINESS };
+        self.set(i, j, Exchange { error: wariness * found.error, ..found });
+    }
+}
+
+/// Sets of elements of at most this many pairs are taken for partly occluded together when tolerances are shared out:
+/// some of their pairs are not, so the others get a little less than they could.
+const LOOKED_AT_TOGETHER: usize = 16;
+
+/// Adds up what stands behind blockers in part.
+struct Sizes<'e> {
+    scene: &'e Scene,
+    pair: &'e LeafPair,
+    of_rows: Vec<f64>,
+    of_columns: Vec<f64>,
+}
+
+impl Findings for Sizes<'_> {
+    fn clear(&mut self, _: &Cluster, _: &Cluster, _: &mut Counts) {}
+
+    fn undecided(&mut self, first: &Cluster, second: &Cluster) -> bool {
+        let (Some(p), Some(q)) = (first.plane, second.plane) else { return false };
+        if first.len() * second.len() > LOOKED_AT_TOGETHER {
+            return false;
+        }
+        let middle = |c: &Cluster| c.hull.iter().sum::<DVec3>() / c.hull.len() as f64;
+        let between = middle(second) - middle(first);
+        let distance = between.length();
+        // Beside each other the middles say little: single pairs are looked at.
+        if distance < first.radius + second.radius {
+            return false;
+        }
+        let tilt = (first.radius + second.radius) / distance;
+        let cosine = |height: f64| (height / distance).clamp(0.25 * tilt, 1.0);
+        let kernel =
+            cosine(p.normal.dot(between)) * cosine(-q.normal.dot(between)) / (PI * distance * distance);
+        let area = |c: &Cluster| self.scene.patches[c.range.clone()].iter().map(|p| p.area).sum::<f64>();
+        let (area_p, area_q) = (area(first), area(second));
+        for i in first.range.clone() {
+            self.of_rows[i - self.pair.rows.start] += self.scene.patches[i].area * area_q * kernel;
+        }
+        for j in second.range.clone() {
+            self.of_columns[j - self.pair.columns.start] += self.scene.patches[j].area * area_p * kernel;
+        }
+        true
+    }
+
+    fn partial(
+        &mut self,
+        (i, j): (usize, usize),
+        pair: &InFront<'_>,
+        _: Range<usize>,
+        _: &mut Counts,
+        _: &mut Scratch<'_>,
+    ) {
+        let size = pair.unblocked_size();
+        self.of_rows[i - self.pair.rows.start] += size;
+        self.of_columns[j - self.pair.columns.start] += size;
+    }
+}
+
+/// Per row the sum over its partly occluded pairs of the factors without blockers.
+fn occluded_sizes(scene: &Scene, skips: &Skips, pairs: &[LeafPair]) -> Vec<f64> {
+    let blocked: Vec<&LeafPair> = pairs.iter().filter(|pair| !pair.blockers.is_empty()).collect();
+    let parts: Vec<Sizes<'_>> = blocked
+        .par_iter()
+        .map_init(Scratch::default, |scratch, pair| {
+            let (of_rows, of_columns) = (vec![0.0; pair.rows.len()], vec![0.0; pair.columns.len()]);
+            let mut sizes = Sizes { scene, pair, of_rows, of_columns };
+            descend(scene, skips, pair, &mut sizes, &mut Counts::default(), scratch);
+            sizes
+        })
+        .collect();
+    let mut sums = vec![0.0; scene.len()];
+    for part in &parts {
+        part.pair.rows.clone().zip(&part.of_rows).for_each(|(i, size)| sums[i] += size);
+        part.pair.columns.clone().zip(&part.of_columns).for_each(|(j, size)| sums[j] += size);
+    }
+    sums.iter().zip(&scene.patches).map(|(sum, patch)| sum / patch.area).collect()
 }

@@ -5,9 +5,9 @@
 //! their areas summed. Rows are made in bands, so that a table of many elements needs no memory of its size.
 
 use interchange::atomic_write::{self, refuse_input};
-use interchange::error::{Error, Result};
+use interchange::error::Result;
 use interchange::grouping::{By, Grouping};
-use interchange::matrix::{Block, BlockKind, Matrix, Values};
+use interchange::matrix::{BlockView, Matrix};
 use interchange::mesh::Mesh;
 use interchange::tables::{TableFormat, number, write_csv, write_npy};
 use std::io::SeekFrom;
@@ -17,19 +17,14 @@ use std::path::Path;
 /// Entries of the table held in memory at a time: 128 MB. Each band reads the blocks it touches once.
 const BAND_ENTRIES: usize = 1 << 24;
 
-/// Writes F to `output`, whose ending says how: `.csv` with a header of names, `.npy` as a dense float64 array,
+/// Writes F of a matrix in one file or in all its parts to `output`, whose ending says how: `.csv` with a header of names, `.npy` as a dense float64 array,
 /// `.mtx` as MatrixMarket coordinates of the entries above 0.
-pub fn run(matrix_path: &Path, mesh_path: &Path, by: By, output: &Path) -> Result<()> {
+pub fn run(matrix_paths: &[impl AsRef<Path>], mesh_path: &Path, by: By, output: &Path) -> Result<()> {
     let format = TableFormat::of(output, &[TableFormat::Csv, TableFormat::Npy, TableFormat::Mtx])?;
-    refuse_input(output, [matrix_path, mesh_path])?;
+    refuse_input(output, matrix_paths.iter().map(AsRef::as_ref).chain([mesh_path]))?;
     let (mesh, _, digest) = Mesh::read(mesh_path)?;
-    let matrix = Matrix::open(matrix_path)?;
+    let matrix = Matrix::open_all(matrix_paths)?;
     matrix.belongs_to(mesh_path, digest, mesh.element_count())?;
-    if matrix.record().parts != 1 {
-        let (part, parts) = (matrix.record().part + 1, matrix.record().parts);
-        let message = format!("holds part {part} of {parts}; export needs the whole matrix");
-        return Err(Error::whole(matrix_path, message));
-    }
     let grouping = Grouping::new(&mesh, by);
     let factors = Factors::new(&matrix, &grouping)?;
     match format {
@@ -78,8 +73,7 @@ fn mtx(factors: &Factors<'_>, by: By, output: &Path) -> Result<()> {
 
 /// F between the keys of a grouping, row by row.
 struct Factors<'a> {
-    blocks: &'a [Block],
-    values: Values<'a>,
+    views: Vec<BlockView<'a>>,
     keys: &'a [u32],
     /// Area of each key.
     areas: Vec<f64>,
@@ -93,8 +87,7 @@ impl<'a> Factors<'a> {
         let element_areas = matrix.areas()?;
         let count = grouping.len();
         Ok(Self {
-            blocks: matrix.blocks()?,
-            values: matrix.values()?,
+            views: matrix.views()?,
             keys: &grouping.key_of_element,
             areas: grouping.sums(|i| element_areas[i]),
             count,
@@ -125,27 +118,21 @@ impl<'a> Factors<'a> {
                 sums[(i - band.start) * self.count + j] += s;
             }
         };
-        for block in self.blocks {
+        for view in &self.views {
             let keys_of = |start: u32, count: u32| &self.keys[start as usize..(start + count) as usize];
-            let rows = keys_of(block.row_start, block.rows);
-            let columns = keys_of(block.column_start, block.columns);
+            let rows = keys_of(view.block.row_start, view.block.rows);
+            let columns = keys_of(view.block.column_start, view.block.columns);
             if !rows.iter().chain(columns).any(|&key| band.contains(&(key as usize))) {
                 continue;
             }
-            let triangle = block.kind() == Ok(BlockKind::Triangle);
-            let mut at = block.offset as usize;
-            for (r, &row) in rows.iter().enumerate() {
-                let first = if triangle { r } else { 0 };
-                for (c, &column) in columns.iter().enumerate().skip(first) {
-                    let s = self.values.get(at);
-                    at += 1;
-                    add(row as usize, column as usize, s);
-                    // The mirror image; an entry on the diagonal is its own.
-                    if !(triangle && r == c) {
-                        add(column as usize, row as usize, s);
-                    }
+            view.for_each(|i, j, s| {
+                let (row, column) = (self.keys[i] as usize, self.keys[j] as usize);
+                add(row, column, s);
+                // The mirror image; an entry on the diagonal is its own.
+                if i != j {
+                    add(column, row, s);
                 }
-            }
+            });
         }
         sums
     }
@@ -154,6 +141,7 @@ impl<'a> Factors<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use interchange::matrix::{Block, BlockKind, Values, views};
 
     /// However few rows are made at a time, the table is the same.
     #[test]
@@ -166,9 +154,9 @@ mod tests {
         let values: Vec<f64> = (1..=13).map(f64::from).collect();
         let keys = [2, 0, 1, 2, 0];
         let table = |band: usize| -> Vec<(usize, Vec<f64>)> {
-            let values = Values::F64(&values);
+            let views = views(&blocks, Values::F64(&values), &[]).collect();
             let areas = vec![1.0, 2.0, 4.0, 0.0];
-            Factors { blocks: &blocks, values, keys: &keys, areas, count: 4, band }.rows().collect()
+            Factors { views, keys: &keys, areas, count: 4, band }.rows().collect()
         };
         let whole = table(4);
         // S between key 0 (elements 1 and 4) and itself: S_11 + 2 S_14 + S_44 = 3 + 2 * 7 + 13.

@@ -1,35 +1,40 @@
 //! `formfactor-tool info`: what a matrix file holds, for people and as JSON.
 
 use interchange::error::Result;
-use interchange::matrix::{Matrix, Precision};
+use interchange::matrix::{BlockKind, Matrix};
 use interchange::report::Report;
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
 
-/// Describes the matrix at `path`; with the counters of the report beside it, where there is one.
-pub fn describe(path: &Path, as_json: bool) -> Result<String> {
-    let matrix = Matrix::open(path)?;
+/// Describes the matrix in one file, in all its parts, or one part alone; with the counters of the report beside the
+/// file, where there is one.
+pub fn describe(paths: &[impl AsRef<Path>], as_json: bool) -> Result<String> {
+    let matrix = match paths {
+        [path] => Matrix::open_part(path.as_ref())?,
+        all => Matrix::open_all(all)?,
+    };
+    let (path, files) = (matrix.path(), paths.len());
     let record = matrix.record();
     let elements = matrix.element_count();
-    let stored = matrix.values()?.len() as u64;
+    let stored = matrix.stored_entries()? as u64;
     // The half that is stored: the upper triangle with the diagonal.
     let half = elements as u64 * (elements as u64 + 1) / 2;
     let absent_share = 1.0 - stored as f64 / half as f64;
     let sums = matrix.row_sums()?;
     let row_sums = Spread::of(&sums);
     let row_errors = Spread::of(matrix.row_errors()?);
-    let precision = match record.precision {
-        Precision::F32 => "f32",
-        Precision::F64 => "f64",
-    };
+    let precision = record.precision.name();
+    let views = matrix.views()?;
+    let sparse = views.iter().filter(|view| view.block.kind() == Ok(BlockKind::Sparse)).count();
+    let part = record.parts != 1 && files == 1;
     let defect = (1.0 - row_sums.least).max(row_sums.largest - 1.0);
     // A row sum within its own estimated error of 1 loses nothing that could be told from error.
     let closed = sums.iter().zip(matrix.row_errors()?).all(|(sum, error)| (1.0 - sum).abs() <= *error);
     let provenance = matrix.provenance();
     let inputs: serde_json::Map<String, Value> =
         provenance.inputs.iter().map(|i| (i.role.clone(), json!(i.digest.to_string()))).collect();
-    let report = read_report(path);
+    let report = if files == 1 { read_report(path) } else { None };
 
     if as_json {
         let data = json!({
@@ -37,7 +42,8 @@ pub fn describe(path: &Path, as_json: bool) -> Result<String> {
             "digest": matrix.digest().to_string(),
             "bytes": matrix.length(),
             "elements": elements,
-            "blocks": matrix.blocks()?.len(),
+            "blocks": views.len(),
+            "sparse_blocks": sparse,
             "stored_entries": stored,
             "absent_share": absent_share,
             "precision": precision,
@@ -49,7 +55,7 @@ pub fn describe(path: &Path, as_json: bool) -> Result<String> {
             "row_errors": row_errors.json(),
             "row_sums": row_sums.json(),
             "largest_row_sum_defect": defect,
-            "closed": closed,
+            "closed": closed && !part,
             "mesh": record.mesh.to_string(),
             "tool": provenance.tool,
             "version": provenance.version,
@@ -70,14 +76,18 @@ pub fn describe(path: &Path, as_json: bool) -> Result<String> {
     line(
         "stored",
         format!(
-            "{stored} entries ({precision}) in {} blocks, {} bytes; {:.1} % of the pairs are absent (zero)",
-            matrix.blocks()?.len(),
+            "{stored} entries ({precision}) in {} blocks ({sparse} of them sparse), {} bytes; {:.1} % of the pairs are \
+             absent (zero)",
+            views.len(),
             matrix.length(),
             100.0 * absent_share
         ),
     );
-    if record.parts != 1 {
-        line("part", format!("{} of {}", record.part + 1, record.parts));
+    if part {
+        let rest = "row sums and errors are those of this part alone";
+        line("part", format!("{} of {}: {rest}", record.part + 1, record.parts));
+    } else if files > 1 {
+        line("files", format!("{files} parts"));
     }
     line("tolerance", format!("{:e} asked per row", record.tolerance));
     line("row errors", row_errors.text());
@@ -86,7 +96,9 @@ pub fn describe(path: &Path, as_json: bool) -> Result<String> {
         true => "closed: every row sum is 1 within its error".to_owned(),
         false => format!("open, or inexact: row sums differ from 1 by up to {defect:.3e}"),
     };
-    line("scene", scene);
+    if !part {
+        line("scene", scene);
+    }
     if let Some(counters) = report.as_ref().and_then(|r| r["counters"].as_object()) {
         counters.iter().for_each(|(name, count)| line("", format!("{name}: {count}")));
     }

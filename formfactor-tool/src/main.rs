@@ -1,8 +1,10 @@
 //! Command line of the form-factor stage.
 
 use clap::{Parser, Subcommand, ValueEnum};
+use formfactor_tool::closure::Closure;
+use formfactor_tool::options::Storage;
 use formfactor_tool::skips::Skip;
-use formfactor_tool::{compute, export, info};
+use formfactor_tool::{compute, export, info, merge};
 use interchange::grouping::By;
 use interchange::tool::{Common, EXIT_CODES, Finish, exit_code, print_data};
 use std::path::PathBuf;
@@ -36,11 +38,26 @@ enum Command {
         /// Do this work even where it is provably not needed
         #[arg(long, value_enum, value_name = "NAME", value_delimiter = ',')]
         no_skip: Vec<Skip>,
+        #[command(flatten)]
+        storage: Storage,
+    },
+    /// Put the files of a matrix that was computed in shards together
+    Merge {
+        /// All shards, in any order
+        #[arg(required = true)]
+        shards: Vec<PathBuf>,
+        /// Matrix file to write
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
+        /// Closure in place of the one that the shards were asked for
+        #[arg(long, value_enum)]
+        closure: Option<Closure>,
     },
     /// Write the factors F(i -> j) as a table
     Export {
-        /// Matrix file
-        matrix: PathBuf,
+        /// Matrix file, or all files of one computed in shards
+        #[arg(required = true)]
+        matrix: Vec<PathBuf>,
         /// Mesh it was computed for
         #[arg(long, value_name = "FILE")]
         mesh: PathBuf,
@@ -53,8 +70,9 @@ enum Command {
     },
     /// Describe a matrix file on one page
     Info {
-        /// Matrix file
-        file: PathBuf,
+        /// Matrix file, one shard, or all files of one computed in shards
+        #[arg(required = true)]
+        file: Vec<PathBuf>,
         /// The same as JSON
         #[arg(long)]
         json: bool,
@@ -68,8 +86,12 @@ enum Method {
 
 fn run(cli: Cli) -> anyhow::Result<Finish> {
     match cli.command {
-        Command::Compute { mesh, output, tolerance, method: Method::Auto, no_skip } => {
-            return compute::run(&compute::Request { mesh, output, tolerance, no_skip }, &cli.common);
+        Command::Compute { mesh, output, tolerance, method: Method::Auto, no_skip, storage } => {
+            let request = compute::Request { mesh, output, tolerance, no_skip, storage };
+            return compute::run(&request, &cli.common);
+        }
+        Command::Merge { shards, output, closure } => {
+            return merge::run(&merge::Request { shards, output, closure }, &cli.common);
         }
         Command::Export { matrix, mesh, by, output } => export::run(&matrix, &mesh, by, &output)?,
         Command::Info { file, json } => print_data(&info::describe(&file, json)?)?,

@@ -3,11 +3,13 @@
 
 use crate::skips::{Skip, Skips};
 use anyhow::Context;
+use geometry::body::{Body, bodies};
 use geometry::merge::merged_occluders;
 use geometry::occluder::Occluder;
 use geometry::patch::Patch;
 use geometry::plane::{PLANARITY, Plane};
-use geometry::sides::SideBits;
+use geometry::shadow::Set;
+use geometry::unoccluded::HEIGHT_ROUNDING;
 use glam::DVec3;
 use interchange::ids::ElementId;
 use interchange::mesh::Mesh;
@@ -21,10 +23,10 @@ pub struct Scene {
     pub patches: Vec<Patch>,
     /// Face of each element.
     pub faces: Vec<u32>,
-    /// Side facts of each element against each occluder.
-    pub sides: Vec<SideBits>,
     /// Convex blocking polygons, merged; none where nothing can block.
     pub occluders: Vec<Occluder>,
+    /// The convex bodies that they make up.
+    pub bodies: Vec<Body>,
     /// Cluster tree; the root is first.
     pub clusters: Vec<Cluster>,
     /// Whether the scene is a convex enclosure seen from inside.
@@ -36,10 +38,10 @@ pub struct Scene {
 pub struct Cluster {
     /// Its elements.
     pub range: Range<usize>,
-    /// Its children in the tree; none for a leaf.
+    /// Its children in the tree; none for a single element.
     pub children: Option<[usize; 2]>,
-    /// Side facts all of them share.
-    pub sides: SideBits,
+    /// Whether it is a leaf of the mesh's tree: pairs of those are the blocks of the matrix.
+    pub is_block: bool,
     /// Points whose convex hull holds all elements: the corners of a rectangle in their plane, or of their bounding box.
     pub hull: Vec<DVec3>,
     /// Plane all elements lie in and look from, where there is one.
@@ -68,21 +70,10 @@ impl Scene {
         if convex && skips.has(Skip::ConvexEnclosure) {
             occluders.clear();
         }
-        let sides: Vec<SideBits> = patches
-            .par_iter()
-            .map(|p| SideBits::of_patch(&p.corners, &p.plane, p.radius, &occluders))
-            .collect();
+        let bodies = bodies(&occluders);
         let faces = mesh.element_ids().map(|e: ElementId| mesh.element_face(e).0).collect();
-        let clusters = mesh
-            .clusters
-            .iter()
-            .map(|c| {
-                let range = c.start as usize..c.end as usize;
-                let children = (!c.is_leaf()).then_some([c.first_child as usize, c.second_child as usize]);
-                Cluster::new(range, children, &patches, &sides)
-            })
-            .collect();
-        Ok(Scene { patches, faces, sides, occluders, clusters, convex })
+        let clusters = cluster_tree(mesh, &patches);
+        Ok(Scene { patches, faces, occluders, bodies, clusters, convex })
     }
 
     /// Number of elements.
@@ -112,14 +103,44 @@ fn is_convex_enclosure(occluders: &[Occluder], patches: &[Patch]) -> bool {
     })
 }
 
-impl Cluster {
-    fn new(
+/// The mesh's tree, whose leaves become blocks of the matrix, continued by halving down to single elements.
+fn cluster_tree(mesh: &Mesh, patches: &[Patch]) -> Vec<Cluster> {
+    struct Node {
         range: Range<usize>,
         children: Option<[usize; 2]>,
-        patches: &[Patch],
-        sides: &[SideBits],
-    ) -> Cluster {
-        let common = range.clone().skip(1).fold(sides[range.start].clone(), |all, i| all.common(&sides[i]));
+        is_block: bool,
+    }
+    let mut nodes: Vec<Node> = mesh
+        .clusters
+        .iter()
+        .map(|c| Node {
+            range: c.start as usize..c.end as usize,
+            children: (!c.is_leaf()).then_some([c.first_child as usize, c.second_child as usize]),
+            is_block: c.is_leaf(),
+        })
+        .collect();
+    let mut at = 0;
+    while at < nodes.len() {
+        let range = nodes[at].range.clone();
+        if nodes[at].children.is_none() && range.len() > 1 {
+            let middle = range.start + range.len() / 2;
+            nodes[at].children = Some([nodes.len(), nodes.len() + 1]);
+            for range in [range.start..middle, middle..range.end] {
+                nodes.push(Node { range, children: None, is_block: false });
+            }
+        }
+        at += 1;
+    }
+    nodes.into_par_iter().map(|n| Cluster::new(n.range, n.children, n.is_block, patches)).collect()
+}
+
+impl Cluster {
+    fn new(range: Range<usize>, children: Option<[usize; 2]>, is_block: bool, patches: &[Patch]) -> Cluster {
+        if range.len() == 1 {
+            let patch = &patches[range.start];
+            let (hull, radius) = (patch.corners.clone(), patch.radius);
+            return Cluster { range, children, is_block, hull, plane: Some(patch.plane), radius };
+        }
         let corners = || range.clone().flat_map(|i| patches[i].corners.iter().copied());
         let first = patches[range.start].plane;
         let extent = corners().map(|c| (c - first.origin).length()).fold(0.0, f64::max);
@@ -132,7 +153,40 @@ impl Cluster {
         };
         let middle = hull.iter().sum::<DVec3>() / hull.len() as f64;
         let radius = hull.iter().map(|&c| (c - middle).length()).fold(0.0, f64::max);
-        Cluster { range, children, sides: common, hull, plane, radius }
+        Cluster { range, children, is_block, hull, plane, radius }
+    }
+
+    /// It as a set of points.
+    pub fn set(&self) -> Set<'_> {
+        Set { corners: &self.hull, radius: self.radius, normal: self.plane.map(|plane| plane.normal) }
+    }
+
+    /// Whether all members of both lie in one plane.
+    pub fn shares_plane(&self, other: &Cluster) -> bool {
+        let (Some(p), Some(q)) = (&self.plane, &other.plane) else { return false };
+        let tolerance = PLANARITY * self.radius.max(other.radius);
+        let lies_in =
+            |hull: &[DVec3], plane: &Plane| hull.iter().all(|&c| plane.distance(c).abs() <= tolerance);
+        lies_in(&self.hull, q) && lies_in(&other.hull, p)
+    }
+
+    /// Whether all of `other` lies at or behind the plane that all of this cluster looks from.
+    pub fn turns_away_from(&self, other: &Cluster) -> bool {
+        let tolerance = PLANARITY * self.radius.max(other.radius);
+        self.plane.is_some_and(|plane| other.hull.iter().all(|&c| plane.distance(c) <= tolerance))
+    }
+
+    /// Whether all of `other` lies at or in front of the plane that all of this cluster looks from.
+    pub fn faces(&self, other: &Cluster) -> bool {
+        let rounding =
+            HEIGHT_ROUNDING * (self.radius + other.radius + (self.hull[0] - other.hull[0]).length());
+        self.plane.is_some_and(|plane| other.hull.iter().all(|&c| plane.distance(c) >= -rounding))
+    }
+
+    /// Whether the body lies at or behind the plane that all of this cluster looks from.
+    pub fn turns_away_from_body(&self, body: &Body) -> bool {
+        let tolerance = PLANARITY * body.radius;
+        self.plane.is_some_and(|plane| body.corners.iter().all(|&c| plane.distance(c) <= tolerance))
     }
 
     /// Number of elements.

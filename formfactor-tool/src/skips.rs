@@ -22,7 +22,7 @@ pub enum Skip {
     InheritedBlockers,
     /// S is symmetric: each pair is computed once
     Reciprocity,
-    /// Blocks of zeros are not stored
+    /// Zeros are not stored: no blocks of zeros, only the others in blocks that hold mostly zeros
     ZeroBlocks,
     /// Equal relative poses of unoccluded near pairs: computed once
     EqualPoses,

@@ -15,11 +15,3 @@ pub struct Tile {
     /// Classes of its pairs.
     pub counts: Counts,
 }
-
-impl Tile {
-    /// Whether nothing sees anything: such a tile is not stored.
-    pub fn is_zero(&self) -> bool {
-        let zero = |values: &[f64]| values.iter().all(|&x| x == 0.0);
-        zero(&self.values) && zero(&self.row_errors) && zero(&self.column_errors)
-    }
-}

@@ -4,7 +4,7 @@
 use crate::scene::{Cluster, Scene};
 use crate::skips::{Skip, Skips};
 use geometry::occluder::separated;
-use geometry::plane::{PLANARITY, Plane};
+use geometry::shadow::{Blocking, Shadows};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -16,7 +16,9 @@ pub struct LeafPair {
     pub rows: Range<usize>,
     /// Columns.
     pub columns: Range<usize>,
-    /// Occluders that may stand between some row and some column, in order.
+    /// The two clusters.
+    pub clusters: [usize; 2],
+    /// Bodies that may stand between some row and some column, in order.
     pub blockers: Vec<u32>,
 }
 
@@ -42,7 +44,7 @@ pub struct Settled {
     pub behind: usize,
     /// Behind one convex blocker.
     pub covered: usize,
-    /// Tests of an occluder against a shaft.
+    /// Tests of a body against a shaft.
     pub shaft_tests: usize,
 }
 
@@ -62,7 +64,7 @@ pub fn leaf_pairs(scene: &Scene, skips: &Skips) -> (Vec<LeafPair>, Settled) {
     if scene.is_empty() {
         return (Vec::new(), Settled::default());
     }
-    let all: Vec<u32> = (0..scene.occluders.len() as u32).collect();
+    let all: Vec<u32> = (0..scene.bodies.len() as u32).collect();
     let walk = Walk { scene, skips };
     let (mut pairs, settled) = walk.visit(0, 0, &all);
     pairs.sort_by_key(|pair| (pair.rows.start, pair.columns.start));
@@ -80,13 +82,13 @@ impl Walk<'_> {
         let (first, second) = (&self.scene.clusters[a], &self.scene.clusters[b]);
         let pairs = if a == b { first.len() * (first.len() + 1) / 2 } else { first.len() * second.len() };
         let mut settled = Settled::default();
-        if self.skips.has(Skip::SamePlane) && in_one_plane(first, second) {
+        if self.skips.has(Skip::SamePlane) && first.shares_plane(second) {
             settled.same_plane = pairs;
             return (Vec::new(), settled);
         }
         if a != b
             && self.skips.has(Skip::BehindClusters)
-            && (is_behind(first, second) || is_behind(second, first))
+            && (first.turns_away_from(second) || second.turns_away_from(first))
         {
             settled.behind = pairs;
             return (Vec::new(), settled);
@@ -94,26 +96,30 @@ impl Walk<'_> {
         let mut blockers = inherited.to_vec();
         if a != b && !inherited.is_empty() {
             settled.shaft_tests = inherited.len();
-            blockers = self.between(first, second, inherited);
-            if self.skips.has(Skip::Covered)
-                && blockers
-                    .iter()
-                    .any(|&k| self.scene.occluders[k as usize].covers(&first.hull, &second.hull))
-            {
-                settled.covered = pairs;
-                return (Vec::new(), settled);
+            match self.between(first, second, inherited) {
+                Some(between) => blockers = between,
+                None => {
+                    settled.covered = pairs;
+                    return (Vec::new(), settled);
+                }
             }
         }
         let all: Vec<u32>;
         let handed_down = if self.skips.has(Skip::InheritedBlockers) {
             &blockers
         } else {
-            all = (0..self.scene.occluders.len() as u32).collect();
+            all = (0..self.scene.bodies.len() as u32).collect();
             &all
         };
-        let children: Vec<(usize, usize)> = match (first.children, second.children) {
+        let inner = |cluster: &Cluster| cluster.children.filter(|_| !cluster.is_block);
+        let children: Vec<(usize, usize)> = match (inner(first), inner(second)) {
             (None, None) => {
-                let pair = LeafPair { rows: first.range.clone(), columns: second.range.clone(), blockers };
+                let pair = LeafPair {
+                    rows: first.range.clone(),
+                    columns: second.range.clone(),
+                    clusters: [a, b],
+                    blockers,
+                };
                 return (vec![pair], settled);
             }
             (Some([c, d]), _) if a == b => vec![(c, c), (c, d), (d, d)],
@@ -132,29 +138,26 @@ impl Walk<'_> {
         (found, settled)
     }
 
-    /// Those of `inherited` that may stand between some member of one and some member of the other.
-    fn between(&self, first: &Cluster, second: &Cluster, inherited: &[u32]) -> Vec<u32> {
+    /// Those of `inherited` that may stand between some member of one and some member of the other; `None` where one of
+    /// them covers all.
+    fn between(&self, first: &Cluster, second: &Cluster, inherited: &[u32]) -> Option<Vec<u32>> {
         let shaft: Vec<DVec3> = first.hull.iter().chain(&second.hull).copied().collect();
-        let may_block = |&&k: &&u32| {
-            first.sides.may_block(&second.sides, k as usize)
-                && !separated(&shaft, &self.scene.occluders[k as usize].corners)
-        };
-        inherited.iter().filter(may_block).copied().collect()
+        let mut shadows = Shadows::default();
+        let mut blockers = Vec::new();
+        for &k in inherited {
+            let body = &self.scene.bodies[k as usize];
+            if first.turns_away_from_body(body) || second.turns_away_from_body(body) {
+                continue;
+            }
+            shadows.clear();
+            match shadows.add(body, first.set(), second.set()) {
+                Blocking::Nothing => {}
+                Blocking::Everything if self.skips.has(Skip::Covered) => return None,
+                Blocking::Everything => blockers.push(k),
+                _ if separated(&shaft, &body.corners) => {}
+                _ => blockers.push(k),
+            }
+        }
+        Some(blockers)
     }
-}
-
-/// Whether all members of both lie in one plane and look the same way or away from each other.
-fn in_one_plane(a: &Cluster, b: &Cluster) -> bool {
-    let (Some(p), Some(q)) = (&a.plane, &b.plane) else { return false };
-    let lies_in = |hull: &[DVec3], plane: &Plane, size: f64| {
-        hull.iter().all(|&c| plane.distance(c).abs() <= PLANARITY * size)
-    };
-    let size = a.radius.max(b.radius);
-    lies_in(&a.hull, q, size) && lies_in(&b.hull, p, size)
-}
-
-/// Whether all of `b` lies at or behind the plane of `a`.
-fn is_behind(a: &Cluster, b: &Cluster) -> bool {
-    let tolerance = PLANARITY * a.radius.max(b.radius);
-    a.plane.is_some_and(|plane| b.hull.iter().all(|&c| plane.distance(c) <= tolerance))
 }

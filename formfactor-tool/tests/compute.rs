@@ -1,59 +1,13 @@
 //! The program on meshes built in code: closed-form factors, closure, storage, determinism, refusals.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod common;
+
 use assert_cmd::Command;
-use interchange::ids::{FaceId, GroupId, MaterialId, NodeId, VertexId};
+use common::{inward_cube, mesh_of, room_with_box};
 use interchange::matrix::{Matrix, Precision};
-use interchange::mesh::{Cluster, Mesh};
 use interchange::provenance::Provenance;
 use std::path::{Path, PathBuf};
-
-/// The six squares of an axis-aligned cube, fronts inward.
-fn inward_cube(low: f64, high: f64) -> Vec<Vec<[f64; 3]>> {
-    let (a, b) = (low, high);
-    vec![
-        vec![[a, a, a], [b, a, a], [b, b, a], [a, b, a]],
-        vec![[a, b, b], [b, b, b], [b, a, b], [a, a, b]],
-        vec![[a, a, a], [a, b, a], [a, b, b], [a, a, b]],
-        vec![[b, a, b], [b, b, b], [b, b, a], [b, a, a]],
-        vec![[a, a, a], [a, a, b], [b, a, b], [b, a, a]],
-        vec![[b, b, a], [b, b, b], [a, b, b], [a, b, a]],
-    ]
-}
-
-/// Every polygon an element, a face and an occluder; one cluster.
-fn mesh_of(polygons: &[Vec<[f64; 3]>]) -> Mesh {
-    let mut mesh = Mesh { groups: vec!["g".into()], materials: vec!["m".into()], ..Mesh::default() };
-    for (k, polygon) in polygons.iter().enumerate() {
-        let first = mesh.vertices.len();
-        mesh.vertices.extend(polygon);
-        let corners: Vec<VertexId> = (first..first + polygon.len()).map(VertexId::new).collect();
-        mesh.elements.push(corners.iter().copied());
-        mesh.element_nodes.push(corners.iter().map(|v| NodeId(v.0)));
-        mesh.node_vertices.extend(&corners);
-        mesh.faces.push(corners.iter().copied());
-        mesh.occluders.push(corners.iter().copied());
-        mesh.element_faces.push(FaceId::new(k));
-        mesh.occluder_faces.push(FaceId::new(k));
-        mesh.element_sides.push(0);
-        mesh.face_inputs.push(k as u32);
-        mesh.face_groups.push(GroupId(0));
-        mesh.face_materials.push(MaterialId(0));
-        mesh.face_flags.push(0);
-    }
-    mesh.input_face_count = polygons.len() as u32;
-    mesh.clusters.push(Cluster { start: 0, end: polygons.len() as u32, first_child: 0, second_child: 0 });
-    mesh
-}
-
-fn room_with_box() -> Vec<Vec<[f64; 3]>> {
-    let mut polygons = inward_cube(0.0, 1.0);
-    polygons.extend(inward_cube(0.25, 0.75).into_iter().map(|mut face| {
-        face.reverse();
-        face
-    }));
-    polygons
-}
 
 fn compute(
     folder: &Path,
@@ -169,7 +123,7 @@ fn convex_rooms_need_no_visibility_and_boxes_outside_see_nothing() {
     let (matrix, run) = compute(folder.path(), &outward, &[]);
     run.success();
     assert_eq!(counter("pairs facing away (skipped)"), 15);
-    assert!(Matrix::open(&matrix).unwrap().blocks().unwrap().is_empty());
+    assert!(Matrix::open(&matrix).unwrap().block_count().unwrap() == 0);
 }
 
 #[test]

@@ -13,7 +13,7 @@ use room::{ADJACENT, OPPOSITE, Room, factor};
 
 fn exported(room: &Room, by: By, name: &str) -> Vec<u8> {
     let output = room.path(name);
-    export::run(&room.matrix, &room.mesh, by, &output).unwrap();
+    export::run(&[&room.matrix], &room.mesh, by, &output).unwrap();
     std::fs::read(output).unwrap()
 }
 
@@ -114,7 +114,7 @@ fn both_sides_of_a_face_are_summed() {
 fn a_foreign_mesh_and_an_unknown_ending_are_refused() {
     let room = Room::new([0.5; 3], 0.0);
     let refusal = |name: &str| {
-        export::run(&room.matrix, &room.mesh, By::Group, &room.path(name)).unwrap_err().to_string()
+        export::run(&[&room.matrix], &room.mesh, By::Group, &room.path(name)).unwrap_err().to_string()
     };
     assert!(refusal("f.txt").contains(".csv or .npy or .mtx"));
     let mut mesh = room::mesh();
@@ -127,11 +127,12 @@ fn a_foreign_mesh_and_an_unknown_ending_are_refused() {
 #[test]
 fn info_shows_size_row_sums_and_errors() {
     let room = Room::new([0.5; 3], 1e-9);
-    let words = info::describe(&room.matrix, false).unwrap();
+    let words = info::describe(&[&room.matrix], false).unwrap();
     for part in ["elements     6", "21 entries (f64) in 3 blocks", "closed", "1e-4 asked", "1.000000e-9"] {
         assert!(words.contains(part), "{part}:\n{words}");
     }
-    let json: serde_json::Value = serde_json::from_str(&info::describe(&room.matrix, true).unwrap()).unwrap();
+    let json: serde_json::Value =
+        serde_json::from_str(&info::describe(&[&room.matrix], true).unwrap()).unwrap();
     assert_eq!((json["elements"].as_u64(), json["blocks"].as_u64()), (Some(6), Some(3)));
     assert_eq!(json["stored_entries"], 21);
     assert_eq!(json["absent_share"], 0.0);

@@ -3,11 +3,11 @@
 //! Knows no file and no radiosity. All lengths are relative: nothing here compares with an absolute epsilon, so a
 //! scene scaled by any factor gives the same answers.
 
-#![forbid(unsafe_code)]
-
 pub mod area_rule;
+pub mod body;
 pub mod contour;
 pub mod edge_pair;
+pub mod far;
 pub mod gather;
 pub mod merge;
 pub mod occluded;
@@ -19,7 +19,9 @@ pub mod point_factor;
 pub mod polygon;
 pub mod quadrature;
 pub mod ray_cast;
+pub mod shadow;
 pub mod shadow_planes;
 pub mod sides;
 pub mod unoccluded;
 pub mod visible;
+pub mod visible_part;

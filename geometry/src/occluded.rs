@@ -1,27 +1,51 @@
 //! Exchange factor of two patches with blockers between them: exact visible parts from receiver points, the receiver cut
-//! adaptively along the shadow planes that cross it, two rules compared for the error.
+//! along the shadow planes that cross it into cells over which the view changes smoothly, rules of rising order per cell.
 
 use crate::contour::Exchange;
-use crate::occluder::Occluder;
-use crate::patch::Patch;
 use crate::polygon;
-use crate::quadrature::{RADON_INNER, Strength, radon_rule, triangle_rule};
-use crate::shadow_planes::{ShadowPlane, shadow_planes};
-use crate::visible::{Scratch, visible_factor};
+use crate::quadrature::gauss;
+use crate::shadow::{Blocking, From, Set, Shadows};
+use crate::shadow_planes::{ShadowPlane, WORTHLESS_CUT, shadow_planes};
+use crate::visible_part::{self, visible_factor};
 use glam::DVec3;
 use std::collections::BinaryHeap;
+use std::ops::Range;
 
-/// Points a side of the strong rule (degree 6) that a cell without shadow planes is compared with.
-const STRONG_POINTS: usize = 4;
-/// Share of the distance between the rules that counts as the error of the better one. With the whole distance the
-/// estimate of the worst row was 14 to 32 times the true error (a room with two boxes, 576 squares, tolerances 1e-3 to
-/// 1e-5). Much tighter or looser tolerances are not covered by that: a feature that all points miss is in no distance.
-const WEAK_ERROR: f64 = 0.25;
-/// Corners are looked at from this part of the way to the centroid inside: on a contact line the corner itself has no
-/// view of its own.
+/// Points a side of the rules of rising order.
+const ORDERS: [usize; 3] = [2, 4, 8];
+/// The factor by which the distance between orders fell counts this many times in the error of the higher order: the next
+/// one may be less lucky.
+const DECAY_ERROR: f64 = 5.0;
+/// A distance may be small by chance: it never counts less than this many times.
+const LEAST_DECAY: f64 = 0.05;
+/// Distances between orders that fall more slowly than this speak of a singularity at the cell's border (an edge that both
+/// patches touch): halving the cell helps more.
+const SLOW_DECAY: f64 = 0.1;
+/// Over a smooth cell the 2 x 2 rule errs like the square of its distance from the centre's value, relative to the value:
+/// that distance is the second order term, the error the fourth. The factor covers the worst of 10^5 cells.
+const SMOOTH_ERROR: f64 = 4.0;
+/// Second order terms may cancel, so that the centre agrees by chance. Then the fourth power of the relative variation v of
+/// the values tells: the 2 x 2 rule's error counts at least this many times v^4, and need not count more than
+/// [`MOST_VARIATION_ERROR`] (both relative to the value).
+const VARIATION_ERROR: f64 = 0.01;
+/// Most that the variation alone counts.
+const MOST_VARIATION_ERROR: f64 = 3e-5;
+/// Where shadow lines cross a cell, its points may all miss what lies between them: that much of the unblocked
+/// factor is never ruled out.
+const UNSEEN: f64 = 0.02;
+/// Corners are looked at from this part of the way to the centre inside.
 const CORNER_INSET: f64 = 1e-3;
-/// A shadow plane that leaves less than this part of the cell's size on one side is not worth a cut.
-const WORTHLESS_CUT: f64 = 1e-9;
+/// Share of the distance between the 2 x 2 rule and the mean over the corners that counts as error where the corners see
+/// something that the points do not: the part of the cell that it may fill.
+const CORNER_ERROR: f64 = 0.1;
+/// Share of the distance between the 2 x 2 rule and the centre's value that counts as error where edges of different
+/// bodies may cross: the view's second derivative may jump there, of which the rule misses a part.
+const KINK: f64 = 0.03;
+/// A cell whose corners are this many times farther off than its centre has a bend inside: higher orders do not help there.
+const BENT: f64 = 8.0;
+/// Up to this many shadow planes the receiver is cut along all of them at once; where there are more, along those that
+/// matter.
+const CUT_AT_ONCE: usize = 8;
 
 /// What an occluded exchange factor cost.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -32,14 +56,36 @@ pub struct Effort {
     pub exhausted: bool,
 }
 
+/// How exact an occluded factor is wanted.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted {
+    /// Absolute error.
+    pub tolerance: f64,
+    /// About the factor without blockers.
+    pub unblocked: f64,
+    /// Whether its error must hold by itself. Among many factors of a row estimates that are too low by chance are made up
+    /// for by the others.
+    pub alone: bool,
+    /// Most visible parts to compute.
+    pub most_evaluations: usize,
+}
+
 /// A convex part of the receiver with its integral.
-#[derive(Debug)]
+#[derive(Debug, Clone, Default)]
 struct Cell {
-    corners: Vec<DVec3>,
+    corners: Range<usize>,
+    shadows: Range<usize>,
     value: f64,
     error: f64,
-    /// Whether the strong rule has been applied.
-    strong: bool,
+    /// Rule applied, as a place in [`ORDERS`].
+    order: usize,
+    /// Whether shadow planes may still cross it.
+    crossed: bool,
+    /// Distance of the value from the one by the order before.
+    distance: f64,
+    /// Whether higher orders do not help: there is a bend or a singularity inside or at the border.
+    is_rough: bool,
+    area: f64,
     /// Order of creation: makes the queue's order unique.
     serial: usize,
 }
@@ -61,171 +107,296 @@ impl Ord for Cell {
     }
 }
 
-/// The integrand: what one receiver point sees of the source.
-struct View<'a> {
-    normal: DVec3,
-    source: &'a [DVec3],
-    blockers: Vec<&'a Occluder>,
-    scratch: &'a mut Scratch,
-    evaluations: usize,
-    points: Vec<DVec3>,
-    weights: Vec<f64>,
+/// Working memory of [`exchange`].
+#[derive(Debug, Default)]
+pub struct Scratch {
+    visible: visible_part::Scratch,
+    corners: Vec<DVec3>,
+    cells: BinaryHeap<Cell>,
+    values: Vec<(f64, f64)>,
+    planes: Vec<ShadowPlane>,
+    front: Vec<DVec3>,
+    back: Vec<DVec3>,
 }
 
-impl View<'_> {
-    fn at(&mut self, point: DVec3) -> f64 {
+struct Integral<'s, 'a> {
+    receiver_area: f64,
+    receiver: Set<'s>,
+    normal: DVec3,
+    source: Set<'s>,
+    shadows: &'s mut Shadows<'a>,
+    from: From,
+    scratch: &'s mut Scratch,
+    wanted: Wanted,
+    evaluations: usize,
+    /// Sum of the cells' errors, and number of cells made.
+    error: f64,
+    made: usize,
+    /// Least and largest value seen in the present cell.
+    low: f64,
+    high: f64,
+}
+
+/// Exchange factor of `receiver` and the polygon `source`, each wholly in front of the other, behind the shadows `which`;
+/// more are put on the stack and taken off again. `from` says which of the shadows' sets the receiver is.
+pub fn exchange(
+    receiver: Set<'_>,
+    source: Set<'_>,
+    shadows: &mut Shadows<'_>,
+    (which, from): (Range<usize>, From),
+    wanted: Wanted,
+    scratch: &mut Scratch,
+) -> (Exchange, Effort) {
+    let corners = receiver.corners;
+    let normal = receiver.normal.unwrap_or_else(|| polygon::vector_area(corners).normalize_or_zero());
+    let base = shadows.len();
+    scratch.corners.clear();
+    scratch.corners.extend_from_slice(corners);
+    scratch.cells.clear();
+    let mut planes = std::mem::take(&mut scratch.planes);
+    shadow_planes(corners, source.corners, shadows, which.clone(), from, &mut planes);
+    let receiver_area = polygon::area(corners);
+    let mut integral = Integral {
+        receiver_area,
+        receiver,
+        normal,
+        source,
+        shadows,
+        from,
+        scratch,
+        wanted,
+        evaluations: 0,
+        error: 0.0,
+        made: 0,
+        low: 0.0,
+        high: 0.0,
+    };
+    let whole = Cell {
+        corners: 0..corners.len(),
+        shadows: which,
+        area: receiver_area,
+        crossed: !planes.is_empty(),
+        ..Cell::default()
+    };
+    integral.run(whole, &planes);
+    let evaluations = integral.evaluations;
+    shadows.truncate(base);
+    scratch.planes = planes;
+
+    // Smallest first: the sum does not depend on the order in which cells were made, and loses no digits.
+    let values = &mut scratch.values;
+    values.clear();
+    values.extend(scratch.cells.iter().map(|c| (c.value, c.error)));
+    values.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let (value, error) = values.iter().fold((0.0, 0.0), |(v, e), &(value, error)| (v + value, e + error));
+    (Exchange { value, error }, Effort { evaluations, exhausted: error > wanted.tolerance })
+}
+
+impl Integral<'_, '_> {
+    fn run(&mut self, whole: Cell, planes: &[ShadowPlane]) {
+        let demanding = self.wanted.tolerance < UNSEEN * self.wanted.unblocked;
+        if demanding && planes.len() <= CUT_AT_ONCE {
+            self.cut_fully(whole, planes);
+        } else {
+            self.add(whole);
+        }
+        loop {
+            if self.error <= self.wanted.tolerance {
+                // The running sum has rounding in it: only a fresh one counts.
+                self.error = self.scratch.cells.iter().map(|c| c.error).sum();
+            }
+            if self.error <= self.wanted.tolerance || self.evaluations >= self.wanted.most_evaluations {
+                return;
+            }
+            let Some(cell) = self.scratch.cells.pop() else { return };
+            self.error -= cell.error;
+            self.improve(cell, planes);
+        }
+    }
+
+    /// Cuts a cell along every plane that crosses it and integrates over the parts.
+    fn cut_fully(&mut self, cell: Cell, planes: &[ShadowPlane]) {
+        match self.best_cut(&cell, planes) {
+            Some(plane) => {
+                for part in self.split(&cell, |p| plane.height(p)).into_iter().flatten() {
+                    self.cut_fully(part, planes);
+                }
+            }
+            None => self.add(Cell { crossed: false, ..cell }),
+        }
+    }
+
+    fn improve(&mut self, cell: Cell, planes: &[ShadowPlane]) {
+        if cell.crossed {
+            match self.best_cut(&cell, planes) {
+                Some(plane) => {
+                    for part in self.split(&cell, |p| plane.height(p)).into_iter().flatten() {
+                        self.add(part);
+                    }
+                }
+                None => self.raise(Cell { crossed: false, ..cell }),
+            }
+        } else if cell.order + 1 < ORDERS.len() && !cell.is_rough {
+            self.raise(cell);
+        } else {
+            let corners = &self.scratch.corners[cell.corners.clone()];
+            let centroid = polygon::centroid(corners);
+            let farthest = corners
+                .iter()
+                .map(|&c| c - centroid)
+                .max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))
+                .unwrap_or(DVec3::X);
+            for part in self.split(&cell, |p| farthest.dot(p - centroid)).into_iter().flatten() {
+                self.add(part);
+            }
+        }
+    }
+
+    /// Applies the next higher order to a cell. Where the distance between orders falls by a factor each time, the error of
+    /// the higher one is the distance times that factor.
+    fn raise(&mut self, mut cell: Cell) {
+        cell.order += 1;
+        let value = self.integrate(&cell, ORDERS[cell.order]);
+        let distance = (value - cell.value).abs();
+        let decay = if cell.distance > 0.0 { distance / cell.distance } else { 0.0 };
+        cell.error = distance * (DECAY_ERROR * decay).clamp(LEAST_DECAY, 1.0);
+        cell.is_rough |= decay > SLOW_DECAY;
+        (cell.value, cell.distance) = (value, distance);
+        self.keep(cell);
+    }
+
+    fn keep(&mut self, mut cell: Cell) {
+        cell.serial = self.made;
+        self.made += 1;
+        self.error += cell.error;
+        self.scratch.cells.push(cell);
+    }
+
+    /// The two parts of a cell, with the shadows that still matter to them; fully dark parts are left out.
+    fn split(&mut self, cell: &Cell, height: impl Fn(DVec3) -> f64) -> [Option<Cell>; 2] {
+        let Scratch { corners, front, back, .. } = &mut *self.scratch;
+        let whole = &corners[cell.corners.clone()];
+        polygon::clip_by(whole, &height, front);
+        polygon::clip_by(whole, |p| -height(p), back);
+        let mut parts = [None, None];
+        for (part, place) in [&*front, &*back].into_iter().zip(&mut parts) {
+            if part.len() < 3 {
+                continue;
+            }
+            let start = self.shadows.len();
+            let dark = cell.shadows.clone().any(|at| {
+                let part = Set { corners: part, ..self.receiver };
+                let (first, second) = match self.from {
+                    From::First => (part, self.source),
+                    From::Second => (self.source, part),
+                };
+                self.shadows.narrow(at, first, second, Some(self.from)) == Blocking::Everything
+            });
+            if dark {
+                self.shadows.truncate(start);
+                continue;
+            }
+            let first = corners.len();
+            corners.extend_from_slice(part);
+            *place = Some(Cell {
+                corners: first..corners.len(),
+                shadows: start..self.shadows.len(),
+                area: polygon::area(part),
+                crossed: cell.crossed,
+                ..Cell::default()
+            });
+        }
+        parts
+    }
+
+    /// Integrates over a new cell and estimates the error.
+    fn add(&mut self, mut cell: Cell) {
+        (self.low, self.high) = (f64::INFINITY, 0.0);
+        let value = self.integrate(&cell, ORDERS[0]);
+        let centre = polygon::centroid(&self.scratch.corners[cell.corners.clone()]);
+        let middle = cell.area * self.at(centre, cell.shadows.clone());
+        let distance = (value - middle).abs();
+        (cell.value, cell.distance) = (value, distance);
+        cell.error = if cell.crossed {
+            distance.max(UNSEEN * cell.area / self.receiver_area * self.wanted.unblocked)
+        } else if cell.shadows.len() < 2 {
+            let size = value.max(middle).max(f64::MIN_POSITIVE);
+            let variation = (self.high - self.low) * cell.area / size;
+            let varied = (VARIATION_ERROR * variation.powi(4)).min(MOST_VARIATION_ERROR);
+            let smooth = if self.wanted.alone { 1.0 } else { SMOOTH_ERROR * distance / size };
+            (distance * smooth.min(1.0)).max(varied * size)
+        } else {
+            // Edges of different bodies that seem to cross (EEE) are in no shadow plane: what they let through or take
+            // away shows first in the cell's corners.
+            let corners = cell.corners.len() as f64;
+            let outer: f64 = cell.corners.clone().map(|k| self.near_corner(k, centre, &cell)).sum();
+            let tip = (value - cell.area * outer / corners).abs();
+            cell.is_rough = tip > BENT * distance;
+            (KINK * distance).max(if cell.is_rough { CORNER_ERROR * tip } else { 0.0 })
+        };
+        self.keep(cell);
+    }
+
+    /// What is seen just inside corner `k` of a cell: on a contact line the corner itself has no view of its own.
+    fn near_corner(&mut self, k: usize, centre: DVec3, cell: &Cell) -> f64 {
+        let corner = self.scratch.corners[k];
+        self.at(corner + CORNER_INSET * (centre - corner), cell.shadows.clone())
+    }
+
+    /// The shadow plane that cuts the cell most evenly.
+    fn best_cut(&self, cell: &Cell, planes: &[ShadowPlane]) -> Option<ShadowPlane> {
+        if cell.shadows.is_empty() {
+            return None;
+        }
+        let corners = &self.scratch.corners[cell.corners.clone()];
+        let tolerance = WORTHLESS_CUT * polygon::diameter(corners);
+        let mut best = None;
+        let mut best_balance = 0.0;
+        for plane in planes {
+            if let Some(balance) = plane.cut_balance(corners, tolerance)
+                && balance > best_balance
+            {
+                best_balance = balance;
+                best = Some(*plane);
+            }
+        }
+        best
+    }
+
+    fn at(&mut self, point: DVec3, shadows: Range<usize>) -> f64 {
         self.evaluations += 1;
-        let seen = visible_factor(point, self.normal, self.source, &self.blockers, self.scratch);
-        if let Some(last) = seen.last {
-            self.blockers[..=last].rotate_right(1);
-        }
-        seen.factor
+        let scratch = &mut self.scratch.visible;
+        let (source, from) = (self.source.corners, self.from);
+        let seen = visible_factor(point, self.normal, source, self.shadows, shadows, from, scratch);
+        (self.low, self.high) = (self.low.min(seen), self.high.max(seen));
+        seen
     }
 
-    /// Integral over a convex cell by Radon's rule, and the larger of its distances from two rules of degree 2: one on
-    /// four of its points, one on the corners and the centroid. The corners catch light or shadow that only reaches
-    /// into a cell's tip, where all seven points would agree on a wrong value.
-    fn weak(&mut self, cell: &[DVec3]) -> (f64, f64) {
-        let (mut value, mut error) = (0.0, 0.0);
-        for k in 2..cell.len() {
-            let triangle = [cell[0], cell[k - 1], cell[k]];
-            self.points.clear();
-            self.weights.clear();
-            radon_rule(triangle, &mut self.points, &mut self.weights);
-            let area = polygon::area(&triangle);
-            let centroid = self.points[0];
-            let (mut fine, mut inner, mut outer) = (0.0, 0.0, 0.0);
-            for n in 0..self.points.len() {
-                let f = self.at(self.points[n]);
-                fine += self.weights[n] * f;
-                inner += RADON_INNER.get(n).map_or(0.0, |w| w * area * f);
-                outer += if n == 0 { 0.75 * area * f } else { 0.0 };
-            }
-            for corner in triangle {
-                outer += area / 12.0 * self.at(corner + CORNER_INSET * (centroid - corner));
-            }
-            value += fine;
-            error += WEAK_ERROR * (fine - inner).abs().max((fine - outer).abs());
-        }
-        (value, error)
-    }
-
-    /// Integral over a convex cell by the strong rule.
-    fn strong(&mut self, cell: &[DVec3]) -> f64 {
+    /// n x n Gauss points on each quadrilateral of a fan, squeezed into triangles.
+    fn integrate(&mut self, cell: &Cell, n: usize) -> f64 {
+        let rule = gauss(n);
+        let count = cell.corners.len();
         let mut value = 0.0;
-        for k in 2..cell.len() {
-            self.points.clear();
-            self.weights.clear();
-            let triangle = [cell[0], cell[k - 1], cell[k]];
-            triangle_rule(triangle, Strength::Product(STRONG_POINTS), &mut self.points, &mut self.weights);
-            for n in 0..self.points.len() {
-                value += self.weights[n] * self.at(self.points[n]);
+        let mut k = 1;
+        while k + 1 < count {
+            let corner = |at: usize| self.scratch.corners[cell.corners.start + at];
+            let (a, b, c) = (corner(0), corner(k), corner(k + 1));
+            // A triangle is a quadrilateral whose first corner is doubled.
+            let d = if k + 2 < count { corner(k + 2) } else { a };
+            for (s, ws) in rule.points.iter().zip(&rule.weights) {
+                let s = 0.5 * (1.0 + s);
+                let (near, far) = (a + s * (b - a), d + s * (c - d));
+                let (along_near, along_far) = (b - a, c - d);
+                for (t, wt) in rule.points.iter().zip(&rule.weights) {
+                    let t = 0.5 * (1.0 + t);
+                    let along = along_near + t * (along_far - along_near);
+                    let jacobian = along.cross(far - near).dot(self.normal);
+                    let point = near + t * (far - near);
+                    value += 0.25 * ws * wt * jacobian * self.at(point, cell.shadows.clone());
+                }
             }
+            k += 2;
         }
         value
     }
-}
-
-/// Exchange factor of two patches, each wholly in front of the other, behind `blockers`: integrated over `receiver`
-/// until the estimated absolute error is at most `tolerance` or `most_evaluations` visible parts have been computed.
-pub fn exchange(
-    receiver: &Patch,
-    source: &Patch,
-    blockers: &[&Occluder],
-    tolerance: f64,
-    most_evaluations: usize,
-    scratch: &mut Scratch,
-) -> (Exchange, Effort) {
-    let mut view = View {
-        normal: receiver.plane.normal,
-        source: &source.corners,
-        blockers: blockers.to_vec(),
-        scratch,
-        evaluations: 0,
-        points: Vec::new(),
-        weights: Vec::new(),
-    };
-    let (value, error) = view.weak(&receiver.corners);
-    let mut error_sum = error;
-    let mut serial = 0;
-    let mut queue =
-        BinaryHeap::from([Cell { corners: receiver.corners.clone(), value, error, strong: false, serial }]);
-    let planes = if error > tolerance { shadow_planes(&source.corners, blockers) } else { Vec::new() };
-    // Summing up the queue afresh would be exact but slow: the running sum is corrected when it matters.
-    while error_sum > tolerance && view.evaluations < most_evaluations {
-        let Some(cell) = queue.pop() else { break };
-        if cell.error == 0.0 {
-            queue.push(cell);
-            break;
-        }
-        error_sum -= cell.error;
-        let cut = if cell.strong { None } else { best_cut(&planes, &cell.corners) };
-        let mut add = |corners: Vec<DVec3>, value: f64, error: f64, strong: bool| {
-            serial += 1;
-            error_sum += error;
-            queue.push(Cell { corners, value, error, strong, serial });
-        };
-        match cut {
-            None if !cell.strong => {
-                let value = view.strong(&cell.corners);
-                // At rounding level a cell cannot get better.
-                let error = (value - cell.value).abs();
-                add(cell.corners, value, error, true);
-            }
-            _ => {
-                let (front, back) = match cut {
-                    Some(plane) => halves(&cell.corners, |p| plane.height(p)),
-                    None => bisect(&cell.corners),
-                };
-                for part in [front, back] {
-                    if part.len() >= 3 {
-                        let (value, error) = view.weak(&part);
-                        add(part, value, error, false);
-                    }
-                }
-            }
-        }
-        if error_sum <= tolerance {
-            error_sum = queue.iter().map(|c| c.error).sum();
-        }
-    }
-    // Smallest first, so that the sum does not depend on the heap's inner order and loses no digits.
-    let mut cells = queue.into_vec();
-    cells.sort_by(|a, b| a.value.total_cmp(&b.value).then(a.serial.cmp(&b.serial)));
-    let error: f64 = cells.iter().map(|c| c.error).sum();
-    let value: f64 = cells.iter().map(|c| c.value).sum();
-    let effort = Effort { evaluations: view.evaluations, exhausted: error > tolerance };
-    (Exchange { value, error }, effort)
-}
-
-/// The shadow plane that cuts the cell most evenly.
-fn best_cut(planes: &[ShadowPlane], cell: &[DVec3]) -> Option<ShadowPlane> {
-    let tolerance = WORTHLESS_CUT * polygon::diameter(cell);
-    let mut best = None;
-    let mut best_balance = 0.0;
-    for plane in planes {
-        if let Some(balance) = plane.cut_balance(cell, tolerance)
-            && balance > best_balance
-        {
-            best_balance = balance;
-            best = Some(*plane);
-        }
-    }
-    best
-}
-
-fn halves(cell: &[DVec3], height: impl Fn(DVec3) -> f64) -> (Vec<DVec3>, Vec<DVec3>) {
-    let (mut front, mut back) = (Vec::new(), Vec::new());
-    polygon::clip_by(cell, &height, &mut front);
-    polygon::clip_by(cell, |p| -height(p), &mut back);
-    (front, back)
-}
-
-/// Cuts a cell across its longest extent, through its centroid.
-fn bisect(cell: &[DVec3]) -> (Vec<DVec3>, Vec<DVec3>) {
-    let centroid = polygon::centroid(cell);
-    let farthest =
-        cell.iter().map(|&c| c - centroid).max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()));
-    let across = farthest.unwrap_or(DVec3::X);
-    halves(cell, |p| across.dot(p - centroid))
 }

@@ -1,98 +1,132 @@
 //! The exchange factor of any two patches of a scene: classified first, then computed by the means of its class.
 
 use crate::area_rule::{Separation, kernel_sum};
+use crate::body::Body;
 use crate::contour::Exchange;
-use crate::occluded::{self, Effort};
-use crate::occluder::{Occluder, separated};
+use crate::occluded::{self, Effort, Wanted};
 use crate::patch::Patch;
+use crate::shadow::{Blocking, From, Set, Shadows};
 use crate::unoccluded::{self, Facing, Rule, facing, mutual_parts};
-use crate::visible::Scratch;
-use glam::DVec3;
+use std::ops::Range;
 
-/// Class of a pair: for the report.
+/// What stands between two patches that see each other's front.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Class {
-    /// The patches face away from each other.
-    Invisible,
-    /// Nothing stands between them; the rule that served.
-    Unoccluded(Rule),
-    /// One convex blocker covers the whole view.
-    FullyBlocked,
-    /// Partly occluded; what it cost.
-    Occluded(Effort),
+pub enum View {
+    /// Nothing.
+    Clear,
+    /// One body that covers all.
+    Covered,
+    /// The bodies whose shadows are on the stack.
+    Partial,
 }
 
-/// How exact a factor is wanted.
-#[derive(Debug, Clone, Copy)]
-pub struct Accuracy {
-    /// Relative error of an unoccluded factor.
-    pub unoccluded: f64,
-    /// Error of an occluded factor, relative to the factor without blockers.
-    pub occluded: f64,
-    /// Factor (of the smaller patch) whose relative error is asked of smaller factors too: they cannot matter more.
-    pub least_factor: f64,
-    /// Most visible parts computed for one pair.
-    pub most_evaluations: usize,
+/// Working memory for pairs; `'a` is the scene's.
+#[derive(Debug, Default)]
+pub struct Scratch<'a> {
+    /// What stands between; sets of patches narrow it before the pairs do.
+    pub shadows: Shadows<'a>,
+    occluded: occluded::Scratch,
 }
 
-/// Exchange factor of two patches; `candidates` are all occluders that could stand between them (none in the plane of
-/// either). `blockers` and `scratch` are working memory.
-pub fn exchange<'a>(
-    p: &Patch,
-    q: &Patch,
-    candidates: impl Iterator<Item = &'a Occluder>,
-    accuracy: Accuracy,
-    blockers: &mut Vec<&'a Occluder>,
-    scratch: &mut Scratch,
-) -> (Exchange, Class) {
-    match facing(p, q) {
-        Facing::Away => (Exchange::NONE, Class::Invisible),
-        Facing::Full => exchange_in_front(p, q, candidates, accuracy, blockers, scratch),
-        Facing::Cut => match mutual_parts(p, q) {
-            Some((p, q)) => exchange_in_front(&p, &q, candidates, accuracy, blockers, scratch),
-            None => (Exchange::NONE, Class::Invisible),
-        },
-    }
+/// Two patches, each wholly in front of the other.
+#[derive(Debug, Clone)]
+pub enum InFront<'p> {
+    /// As they are.
+    Whole(&'p Patch, &'p Patch),
+    /// Cut at each other's planes.
+    Cut(Box<(Patch, Patch)>),
 }
 
-fn exchange_in_front<'a>(
-    p: &Patch,
-    q: &Patch,
-    candidates: impl Iterator<Item = &'a Occluder>,
-    accuracy: Accuracy,
-    blockers: &mut Vec<&'a Occluder>,
-    scratch: &mut Scratch,
-) -> (Exchange, Class) {
-    // Blockers that reach into the hull of the pair; one that covers it ends the matter.
-    let shaft: Vec<DVec3> = p.corners.iter().chain(&q.corners).copied().collect();
-    blockers.clear();
-    for candidate in candidates {
-        if separated(&shaft, &candidate.corners) {
-            continue;
+impl<'p> InFront<'p> {
+    /// The parts of two patches that see each other's front; `None` where there are none.
+    pub fn new(p: &'p Patch, q: &'p Patch) -> Option<Self> {
+        match facing(p, q) {
+            Facing::Away => None,
+            Facing::Full => Some(Self::Whole(p, q)),
+            Facing::Cut => mutual_parts(p, q).map(|parts| Self::Cut(Box::new(parts))),
         }
-        if candidate.covers(&p.corners, &q.corners) {
-            return (Exchange::NONE, Class::FullyBlocked);
-        }
-        blockers.push(candidate);
-    }
-    if blockers.is_empty() {
-        let (found, rule) = unoccluded::exchange_in_front(p, q, accuracy.unoccluded);
-        return (found, Class::Unoccluded(rule));
     }
 
-    // The smaller patch receives: shadow planes are fewer across it, and the source is cut exactly anyway.
-    let (receiver, source) = if q.area < p.area { (q, p) } else { (p, q) };
-    let unblocked = unblocked_size(p, q);
-    let tolerance = accuracy.occluded * unblocked.max(accuracy.least_factor * p.area.min(q.area));
-    let (found, effort) =
-        occluded::exchange(receiver, source, blockers, tolerance, accuracy.most_evaluations, scratch);
-    (found, Class::Occluded(effort))
+    /// The two patches.
+    pub fn patches(&self) -> (&Patch, &Patch) {
+        match self {
+            Self::Whole(p, q) => (p, q),
+            Self::Cut(parts) => (&parts.0, &parts.1),
+        }
+    }
+
+    /// What of the shadows `which`, found for sets that hold the two patches, stands between them; where some do in part,
+    /// their narrowed shadows are put on the stack.
+    pub fn view(&self, which: Range<usize>, shadows: &mut Shadows<'_>) -> View {
+        let (p, q) = self.patches();
+        narrow_all(which, set(p), set(q), shadows)
+    }
+
+    /// About the exchange factor without blockers, for sharing out the tolerance.
+    pub fn unblocked_size(&self) -> f64 {
+        let (p, q) = self.patches();
+        let separation = Separation::new(p, q);
+        let estimate = kernel_sum(&p.low, p.plane.normal, &q.low, q.plane.normal);
+        // Beside a common edge the points overestimate; a factor is at most 1 on either side.
+        estimate.max(1e-3 * separation.kernel).min(p.area.min(q.area))
+    }
+
+    /// Exchange factor with nothing between, within `relative` of its value.
+    pub fn unoccluded(&self, relative: f64) -> (Exchange, Rule) {
+        let (p, q) = self.patches();
+        unoccluded::exchange_in_front(p, q, relative)
+    }
+
+    /// Exchange factor behind the shadows `which` that [`InFront::view`] put on the stack.
+    pub fn occluded(
+        &self,
+        which: Range<usize>,
+        wanted: Wanted,
+        scratch: &mut Scratch<'_>,
+    ) -> (Exchange, Effort) {
+        let (p, q) = self.patches();
+        let Scratch { shadows, occluded } = scratch;
+        // The receiver is the patch that fewer planes through a blocker's edge and a corner of the other one cross: its
+        // view changes more smoothly, and the other one is cut exactly anyway.
+        let lines_on_p = shadows.crossings(which.clone(), From::First, &p.corners, &q.corners);
+        let lines_on_q = shadows.crossings(which.clone(), From::Second, &q.corners, &p.corners);
+        let q_receives = lines_on_q < lines_on_p || (lines_on_q == lines_on_p && q.area < p.area);
+        let (receiver, source, from) = if q_receives { (q, p, From::Second) } else { (p, q, From::First) };
+        occluded::exchange(set(receiver), set(source), shadows, (which, from), wanted, occluded)
+    }
 }
 
-/// About the exchange factor without blockers, for sharing out the tolerance.
-fn unblocked_size(p: &Patch, q: &Patch) -> f64 {
-    let separation = Separation::new(p, q);
-    let estimate = kernel_sum(&p.low, p.plane.normal, &q.low, q.plane.normal);
-    // Beside a common edge the points overestimate; a factor is at most 1 on either side.
-    estimate.max(1e-3 * separation.kernel).min(p.area.min(q.area))
+/// A patch as a set of points.
+pub fn set(patch: &Patch) -> Set<'_> {
+    Set { corners: &patch.corners, radius: patch.radius, normal: Some(patch.plane.normal) }
+}
+
+/// Narrows the shadows `which` to two sets inside those they were found for.
+pub fn narrow_all(which: Range<usize>, first: Set<'_>, second: Set<'_>, shadows: &mut Shadows<'_>) -> View {
+    let start = shadows.len();
+    for at in which {
+        if shadows.narrow(at, first, second, None) == Blocking::Everything {
+            shadows.truncate(start);
+            return View::Covered;
+        }
+    }
+    if shadows.len() == start { View::Clear } else { View::Partial }
+}
+
+/// Looks how a body stands between two sets that see each other's front; its shadow (or those of its faces) is put on the
+/// stack where it blocks a part.
+pub fn look<'a>(body: &'a Body, first: Set<'_>, second: Set<'_>, shadows: &mut Shadows<'a>) -> Blocking {
+    let before = shadows.len();
+    match shadows.add(body, first, second) {
+        Blocking::Inside => {
+            for part in &body.parts {
+                if look(part, first, second, shadows) == Blocking::Everything {
+                    shadows.truncate(before);
+                    return Blocking::Everything;
+                }
+            }
+            if shadows.len() > before { Blocking::Part } else { Blocking::Nothing }
+        }
+        blocking => blocking,
+    }
 }

@@ -106,7 +106,7 @@ pub fn polygon_rule(corners: &[DVec3], strength: Strength, points: &mut Vec<DVec
     if strength == Strength::Centroid {
         points.push(polygon::centroid(corners));
         weights.push(polygon::area(corners));
-    } else if let Some((origin, u, v)) = parallelogram(corners) {
+    } else if let Some((origin, u, v)) = polygon::parallelogram(corners) {
         let n = match strength {
             Strength::Centroid => 1,
             Strength::Low => 2,
@@ -179,15 +179,6 @@ fn squeezed_rule(t: [DVec3; 3], area: f64, n: usize, points: &mut Vec<DVec3>, we
             weights.push(0.5 * area * ws * wq * s);
         }
     }
-}
-
-/// Corner and two sides where the polygon is a parallelogram to rounding.
-fn parallelogram(corners: &[DVec3]) -> Option<(DVec3, DVec3, DVec3)> {
-    let &[a, b, c, d] = corners else { return None };
-    let (u, v) = (b - a, d - a);
-    // Sums of three coordinates each: a few roundings of the coordinates' size relative to the polygon.
-    let rounding = 8.0 * f64::EPSILON * (a.abs() + b.abs() + c.abs() + d.abs()).max_element();
-    ((a + c - b - d).abs().max_element() <= rounding).then_some((a, u, v))
 }
 
 #[cfg(test)]

@@ -4,9 +4,13 @@
 //! Between these planes the visible part of the source depends smoothly on the receiver point, so quadrature on cells
 //! that do not cross them converges fast. Events of three skew edges (EEE) of different blockers are left to adaptivity.
 
-use crate::occluder::Occluder;
 use crate::polygon;
+use crate::shadow::{From, Shadows};
 use glam::DVec3;
+use std::ops::Range;
+
+/// A plane that leaves less than this part of a polygon's size on one side is not worth a cut.
+pub const WORTHLESS_CUT: f64 = 1e-9;
 
 /// A plane g(x) = normal . (x - apex) = 0 with the triangle that makes it.
 #[derive(Debug, Clone, Copy)]
@@ -28,27 +32,46 @@ enum Kind {
     BlockerPlane,
 }
 
-/// All shadow planes of a source and its blockers.
-pub fn shadow_planes(source: &[DVec3], blockers: &[&Occluder]) -> Vec<ShadowPlane> {
-    let mut planes = Vec::new();
+/// The shadow planes of a source and the shadows `which` that cut `receiver` visibly.
+pub fn shadow_planes(
+    receiver: &[DVec3],
+    source: &[DVec3],
+    shadows: &Shadows<'_>,
+    which: Range<usize>,
+    from: From,
+    planes: &mut Vec<ShadowPlane>,
+) {
+    planes.clear();
+    let tolerance = WORTHLESS_CUT * polygon::diameter(receiver);
     let mut push = |apex: DVec3, from: DVec3, to: DVec3, kind: Kind| {
-        let normal = (from - apex).cross(to - apex).normalize_or_zero();
-        if normal != DVec3::ZERO {
-            planes.push(ShadowPlane { apex, from, to, normal, kind });
+        let normal = (from - apex).cross(to - apex);
+        // Most planes pass the receiver by: that needs no unit normal.
+        let is_above = |p: &DVec3| normal.dot(*p - apex) > 0.0;
+        let count = receiver.iter().filter(|p| is_above(p)).count();
+        if count == 0 || count == receiver.len() {
+            return;
+        }
+        let plane = ShadowPlane { apex, from, to, normal: normal.normalize_or_zero(), kind };
+        if plane.normal != DVec3::ZERO && plane.cut_balance(receiver, tolerance).is_some() {
+            planes.push(plane);
         }
     };
-    for blocker in blockers {
-        for (from, to) in polygon::edges(&blocker.corners) {
-            source.iter().for_each(|&corner| push(corner, from, to, Kind::SourceCorner));
-        }
-        for &corner in &blocker.corners {
-            polygon::edges(source).for_each(|(from, to)| push(corner, from, to, Kind::BlockerCorner));
-        }
-        if let [a, b, c, ..] = blocker.corners[..] {
-            push(a, b, c, Kind::BlockerPlane);
-        }
+    for at in which {
+        let mut vertices: Vec<DVec3> = Vec::new();
+        shadows.for_each_edge(at, from, |edge| {
+            source.iter().for_each(|&corner| push(corner, edge.from, edge.to, Kind::SourceCorner));
+            for end in [edge.from, edge.to] {
+                if !vertices.contains(&end) {
+                    vertices.push(end);
+                    polygon::edges(source).for_each(|(a, b)| push(end, a, b, Kind::BlockerCorner));
+                }
+            }
+        });
+        shadows.for_each_crossed_face(at, from, |face| {
+            let (x, y) = face.axes();
+            push(face.origin, face.origin + x, face.origin + y, Kind::BlockerPlane);
+        });
     }
-    planes
 }
 
 impl ShadowPlane {

@@ -31,8 +31,12 @@ pub enum Rule {
 
 /// Product rules beyond this many points a side cost more than any contour and gain nothing in f64.
 const LARGEST_PRODUCT: usize = 12;
+/// Patches are halved at most this often to get their parts far enough apart for a product rule.
+const DEEPEST_HALVING: usize = 8;
+/// Patches nearer than this (sizes over distance of the centres) may touch: their contour does not cancel.
+const NEAR: f64 = 1.5;
 /// A corner this little below a plane (in units of the pair's size) is on it: a few roundings of its height.
-const HEIGHT_ROUNDING: f64 = 16.0 * f64::EPSILON;
+pub const HEIGHT_ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 /// How two patches face each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,6 +91,22 @@ pub fn exchange(p: &Patch, q: &Patch, relative: f64) -> (Exchange, Rule) {
 
 /// As [`exchange`] for patches known to lie wholly in front of each other.
 pub fn exchange_in_front(p: &Patch, q: &Patch, relative: f64) -> (Exchange, Rule) {
+    in_front(p, q, relative, DEEPEST_HALVING)
+}
+
+/// Halves of the larger patch, cut across its longest extent.
+fn halves(patch: &Patch) -> Option<[Patch; 2]> {
+    let extent = |&c: &DVec3| (c - patch.centroid).length_squared();
+    let farthest = *patch.corners.iter().max_by(|a, b| extent(a).total_cmp(&extent(b)))?;
+    let along = farthest - patch.centroid;
+    let (mut front, mut back) = (Vec::new(), Vec::new());
+    polygon::clip_by(&patch.corners, |c| along.dot(c - patch.centroid), &mut front);
+    polygon::clip_by(&patch.corners, |c| -along.dot(c - patch.centroid), &mut back);
+    let keep = |part| Patch::new(part).map(|part| Patch { plane: patch.plane, ..part });
+    Some([keep(front)?, keep(back)?])
+}
+
+fn in_front(p: &Patch, q: &Patch, relative: f64, halvings: usize) -> (Exchange, Rule) {
     let separation = Separation::new(p, q);
     let relative = relative.max(1e-12);
     let allowed = relative * separation.value;
@@ -114,6 +134,18 @@ pub fn exchange_in_front(p: &Patch, q: &Patch, relative: f64) -> (Exchange, Rule
             );
             let value = kernel_sum(&points_p, p.plane.normal, &points_q, q.plane.normal);
             return (Exchange { value, error: separation.error(Strength::Product(n)) }, Rule::Product);
+        }
+        // Long and thin, or large and not quite touching: the contour's terms cancel, the halves are far enough in time.
+        if halvings > 0 && separation.theta < NEAR {
+            let (small, large) = if p.radius < q.radius { (p, q) } else { (q, p) };
+            if let Some(parts) = halves(large) {
+                let mut sum = Exchange::NONE;
+                for part in &parts {
+                    let (found, _) = in_front(part, small, relative, halvings - 1);
+                    sum = Exchange { value: sum.value + found.value, error: sum.error + found.error };
+                }
+                return (sum, Rule::Product);
+            }
         }
     }
     // Near pairs: the centres say little about the value, so the contour refines until its own value is met.

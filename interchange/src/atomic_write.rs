@@ -4,7 +4,8 @@
 use crate::error::{Error, Result};
 use std::fs::{File, OpenOptions};
 use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use tempfile::{NamedTempFile, TempPath};
 
 /// Whether the target changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,33 +28,110 @@ pub fn refuse_input<'a>(output: &Path, inputs: impl IntoIterator<Item = &'a Path
     Ok(())
 }
 
+/// A file being written beside its target. Dropped without [`Partial::commit`], it goes and the target stays as it was.
+#[derive(Debug)]
+pub struct Partial {
+    target: PathBuf,
+    file: NamedTempFile,
+}
+
+impl Partial {
+    /// A new file under a name of its own.
+    pub fn create(target: &Path) -> Result<Self> {
+        refuse_folder(target)?;
+        let file = tempfile::Builder::new()
+            .prefix(&format!(".{}.", name_of(target)))
+            .suffix(".partial")
+            .tempfile_in(folder_of(target))
+            .map_err(|e| Error::io(target, "write beside", e))?;
+        Ok(Self { target: target.to_owned(), file })
+    }
+
+    /// A new file under the name of [`Partial::path_for`], where a later run finds what a killed one left. What stands
+    /// there is replaced.
+    pub fn create_named(target: &Path, word: &str) -> Result<Self> {
+        refuse_folder(target)?;
+        Self::named(target, word, OpenOptions::new().create(true).truncate(true))
+    }
+
+    /// The file that a killed run left under the name of [`Partial::path_for`].
+    pub fn reopen(target: &Path, word: &str) -> Result<Self> {
+        Self::named(target, word, &mut OpenOptions::new())
+    }
+
+    fn named(target: &Path, word: &str, options: &mut OpenOptions) -> Result<Self> {
+        let path = Self::path_for(target, word);
+        let io = |e| Error::io(target, "write beside", e);
+        let file = options.read(true).write(true).open(&path).map_err(io)?;
+        // An absolute path, so that it is found at the end whatever the working folder is by then.
+        let path = path.canonicalize().map_err(io)?;
+        let path = TempPath::try_from_path(path).map_err(io)?;
+        Ok(Self { target: target.to_owned(), file: NamedTempFile::from_parts(file, path) })
+    }
+
+    /// Where [`Partial::create_named`] writes: `.s.ff.WORD.partial` for `s.ff`.
+    pub fn path_for(target: &Path, word: &str) -> PathBuf {
+        target.with_file_name(format!(".{}.{word}.partial", name_of(target)))
+    }
+
+    /// What it will become.
+    pub fn target(&self) -> &Path {
+        &self.target
+    }
+
+    /// Another handle to the file; all handles share one place in it.
+    pub fn handle(&self) -> Result<File> {
+        self.file.as_file().try_clone().map_err(|e| Error::io(&self.target, "write beside", e))
+    }
+
+    /// Whether the file stays where it is when it is dropped without a commit.
+    pub fn keep_when_dropped(&mut self, keep: bool) {
+        self.file.disable_cleanup(keep);
+    }
+
+    /// Syncs the file and renames it to its target, unless the target holds the same bytes.
+    pub fn commit(mut self) -> Result<Outcome> {
+        let path = self.target.clone();
+        let io = |action: &'static str| {
+            let path = &path;
+            move |e| Error::io(path, action, e)
+        };
+        self.file.disable_cleanup(false);
+        if same_bytes(self.file.as_file_mut(), &path).map_err(io("compare with"))? {
+            return Ok(Outcome::Unchanged);
+        }
+        set_normal_permissions(self.file.as_file(), &path).map_err(io("set permissions of"))?;
+        self.file.as_file().sync_all().map_err(io("sync"))?;
+        self.file.persist(&path).map_err(|e| Error::io(&path, "rename to", e.error))?;
+        sync_folder(folder_of(&path));
+        Ok(Outcome::Written)
+    }
+}
+
+fn refuse_folder(path: &Path) -> Result<()> {
+    match path.is_dir() {
+        true => Err(Error::io(path, "write", std::io::ErrorKind::IsADirectory.into())),
+        false => Ok(()),
+    }
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+fn name_of(path: &Path) -> String {
+    path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
 /// Writes what `fill` produces to `path`. On any error the old file is untouched.
 pub fn write(path: &Path, fill: impl FnOnce(&mut dyn WriteSeek) -> std::io::Result<()>) -> Result<Outcome> {
-    let io = |action| move |e| Error::io(path, action, e);
-    if path.is_dir() {
-        return Err(Error::io(path, "write", std::io::ErrorKind::IsADirectory.into()));
-    }
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let mut partial = tempfile::Builder::new()
-        .prefix(&format!(".{name}."))
-        .suffix(".partial")
-        .tempfile_in(folder)
-        .map_err(io("write beside"))?;
-
-    let mut buffered = BufWriter::with_capacity(1 << 20, partial.as_file_mut());
-    fill(&mut buffered).map_err(io("write"))?;
-    buffered.flush().map_err(io("write"))?;
+    let io = |e| Error::io(path, "write", e);
+    let partial = Partial::create(path)?;
+    let mut buffered = BufWriter::with_capacity(1 << 20, partial.handle()?);
+    fill(&mut buffered).map_err(io)?;
+    buffered.flush().map_err(io)?;
     drop(buffered);
-
-    if same_bytes(partial.as_file_mut(), path).map_err(io("compare with"))? {
-        return Ok(Outcome::Unchanged);
-    }
-    set_normal_permissions(partial.as_file(), path).map_err(io("set permissions of"))?;
-    partial.as_file().sync_all().map_err(io("sync"))?;
-    partial.persist(path).map_err(|e| Error::io(path, "rename to", e.error))?;
-    sync_folder(folder);
-    Ok(Outcome::Written)
+    partial.commit()
 }
 
 /// A sink that can go back to fill in what it only knows at the end.
@@ -105,8 +183,7 @@ fn set_normal_permissions(file: &File, path: &Path) -> std::io::Result<()> {
 #[cfg(unix)]
 fn new_file_mode(path: &Path) -> std::io::Result<u32> {
     use std::os::unix::fs::PermissionsExt;
-    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    let sample = path.with_file_name(format!(".{name}.{}.mode", std::process::id()));
+    let sample = path.with_file_name(format!(".{}.{}.mode", name_of(path), std::process::id()));
     let file = OpenOptions::new().write(true).create(true).truncate(true).open(&sample)?;
     let mode = file.metadata()?.permissions().mode();
     std::fs::remove_file(&sample)?;

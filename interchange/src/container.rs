@@ -2,7 +2,9 @@
 //! provenance and the kind's own record, then 64-byte-aligned little-endian sections that are used where they are
 //! mapped. Envelope, header and every section carry checks; all are verified before a number is handed out.
 
-use crate::atomic_write::{self, Outcome};
+mod stream;
+
+use crate::atomic_write::{Outcome, Partial};
 use crate::digest::Digest;
 use crate::error::{Error, Result};
 use crate::mapping;
@@ -13,12 +15,14 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::path::{Path, PathBuf};
 
+pub use stream::Stream;
+
 /// Largest header: names and block lists are sections, so a header of more than 1 MiB is damage or malice.
 pub const HEADER_LIMIT: usize = 1 << 20;
 /// Sections start at multiples of a cache line.
 pub const SECTION_ALIGNMENT: u64 = 64;
 /// Version written; readers take any minor version of a known major one.
-pub const VERSION: (u16, u16) = (1, 0);
+pub const VERSION: (u16, u16) = (1, 1);
 const ENVELOPE_LENGTH: usize = 32;
 /// Checksums of large sections are computed in pieces of this many bytes on all cores.
 const CHECKSUM_PIECE: usize = 1 << 22;
@@ -108,40 +112,13 @@ impl<'a> Writer<'a> {
 
     /// Writes the file with `provenance` and the kind's own `record`; identical output leaves the old file alone.
     pub fn write<R: Serialize>(&self, path: &Path, provenance: Provenance, record: R) -> Result<Outcome> {
-        // Integers have a fixed size, so a header with zero offsets is as long as the final one.
-        let mut header = Header {
-            provenance,
-            sections: self
-                .sections
-                .iter()
-                .map(|&(name, bytes)| Section {
-                    name: name.into(),
-                    offset: 0,
-                    length: bytes.len() as u64,
-                    crc32: checksum(bytes),
-                })
-                .collect(),
-            record,
-        };
-        let mut end = (ENVELOPE_LENGTH + encode(path, &header)?.len()) as u64;
-        for section in &mut header.sections {
-            section.offset = end.next_multiple_of(SECTION_ALIGNMENT);
-            end = section.offset + section.length;
+        let names: Vec<&str> = self.sections.iter().map(|s| s.0).collect();
+        let mut stream = Stream::create(Partial::create(path)?, self.kind, provenance, &names, record)?;
+        for (name, bytes) in &self.sections {
+            stream.begin(name)?;
+            stream.append(bytes)?;
         }
-        let encoded = encode(path, &header)?;
-        let envelope = envelope(self.kind, &encoded);
-
-        atomic_write::write(path, |out| {
-            out.write_all(&envelope)?;
-            out.write_all(&encoded)?;
-            let mut at = (ENVELOPE_LENGTH + encoded.len()) as u64;
-            for (section, (_, bytes)) in header.sections.iter().zip(&self.sections) {
-                out.write_all(&[0; SECTION_ALIGNMENT as usize][..(section.offset - at) as usize])?;
-                out.write_all(bytes)?;
-                at = section.offset + section.length;
-            }
-            Ok(())
-        })
+        stream.finish()
     }
 }
 
@@ -164,8 +141,19 @@ fn envelope(kind: Kind, header: &[u8]) -> [u8; ENVELOPE_LENGTH] {
     envelope
 }
 
-/// CRC-32 of `bytes`; pieces are hashed on all cores and combined in order, so the value is the plain one.
+/// CRC-32 of `bytes`.
 fn checksum(bytes: &[u8]) -> u32 {
+    let mut whole = crc32fast::Hasher::new();
+    checksum_into(&mut whole, bytes);
+    whole.finalize()
+}
+
+/// Adds `bytes` to a CRC-32; pieces are hashed on all cores and combined in order, so the value is the plain one.
+fn checksum_into(whole: &mut crc32fast::Hasher, bytes: &[u8]) {
+    if bytes.len() <= CHECKSUM_PIECE {
+        whole.update(bytes);
+        return;
+    }
     let pieces: Vec<crc32fast::Hasher> = bytes
         .par_chunks(CHECKSUM_PIECE)
         .map(|piece| {
@@ -174,11 +162,7 @@ fn checksum(bytes: &[u8]) -> u32 {
             hasher
         })
         .collect();
-    let mut whole = crc32fast::Hasher::new();
-    for piece in &pieces {
-        whole.combine(piece);
-    }
-    whole.finalize()
+    pieces.iter().for_each(|piece| whole.combine(piece));
 }
 
 /// A mapped file whose envelope, header and section checksums have been verified.
@@ -447,7 +431,7 @@ mod tests {
         newer[8] = 9;
         std::fs::write(&path, newer).unwrap();
         let message = File::<u32>::open(&path, Kind::Mesh).unwrap_err().to_string();
-        assert!(message.contains("found 9.0") && message.contains("update the program"), "{message}");
+        assert!(message.contains("found 9.1") && message.contains("update the program"), "{message}");
     }
 
     #[test]

@@ -1,91 +1,27 @@
 //! The matrix file: the exchange matrix S = diag(A) F, symmetric, stored once, as blocks over the cluster order.
 //! A matrix that is not symmetric (measured or computed elsewhere) has blocks on both sides of the diagonal.
 //!
-//! Element pairs whose entry is zero by proof are in no block. A file may hold only part of the blocks.
+//! Element pairs whose entry is zero by proof are in no block. A file may hold only part of the blocks; a [`Matrix`] is
+//! made of all its parts.
 
-use crate::atomic_write::Outcome;
-use crate::container::{File, Kind, Writer};
+mod block;
+mod check;
+mod packed;
+mod parts;
+mod values;
+mod writer;
+
+use crate::container::{File, Kind};
 use crate::digest::Digest;
 use crate::error::{Error, Result};
 use crate::provenance::Provenance;
-use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// How a block stores its entries.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BlockKind {
-    /// All entries, row after row.
-    Dense,
-    /// A square block on the diagonal: the upper triangle with the diagonal, row after row.
-    Triangle,
-}
-
-/// Codes of the block kinds. 2 (sparse rows) and 3 (low rank U V^T) are reserved: readers refuse them by name.
-const CODES: [(u32, BlockKind); 2] = [(0, BlockKind::Dense), (1, BlockKind::Triangle)];
-
-/// A rectangle of S, rows before or equal to columns in cluster order; its mirror image is not stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
-#[repr(C)]
-pub struct Block {
-    /// First row.
-    pub row_start: u32,
-    /// Number of rows.
-    pub rows: u32,
-    /// First column.
-    pub column_start: u32,
-    /// Number of columns.
-    pub columns: u32,
-    /// Code of the [`BlockKind`].
-    pub code: u32,
-    /// Rank of a low-rank block; 0 otherwise.
-    pub rank: u32,
-    /// First entry in the `values` section.
-    pub offset: u64,
-}
-
-impl Block {
-    /// A dense or triangular block.
-    pub fn new(
-        kind: BlockKind,
-        rows: std::ops::Range<u32>,
-        columns: std::ops::Range<u32>,
-        offset: u64,
-    ) -> Self {
-        let code = CODES.iter().find(|(_, k)| *k == kind).map_or(0, |(code, _)| *code);
-        Self {
-            row_start: rows.start,
-            rows: rows.len() as u32,
-            column_start: columns.start,
-            columns: columns.len() as u32,
-            code,
-            rank: 0,
-            offset,
-        }
-    }
-
-    /// Kind, or the code that is not known.
-    pub fn kind(&self) -> std::result::Result<BlockKind, u32> {
-        CODES.iter().find(|(code, _)| *code == self.code).map(|(_, kind)| *kind).ok_or(self.code)
-    }
-
-    /// Number of stored entries.
-    pub fn stored(&self) -> u64 {
-        match self.kind() {
-            Ok(BlockKind::Triangle) => u64::from(self.rows) * (u64::from(self.rows) + 1) / 2,
-            _ => u64::from(self.rows) * u64::from(self.columns),
-        }
-    }
-}
-
-/// Storage of the entries.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Precision {
-    /// 32-bit entries.
-    F32,
-    /// 64-bit entries.
-    F64,
-}
+pub use block::{Block, BlockKind, BlockView, views};
+pub use packed::PackedBlock;
+pub use values::{Precision, Values};
+pub use writer::{MatrixWriter, write};
 
 /// The part of the header that is the matrix's own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -108,71 +44,57 @@ pub struct MatrixRecord {
     pub parts: u32,
 }
 
-/// Entries in their stored precision.
-#[derive(Debug, Clone, Copy)]
-pub enum Values<'a> {
-    /// 32-bit.
-    F32(&'a [f32]),
-    /// 64-bit.
-    F64(&'a [f64]),
-}
+/// One mapped file.
+type PartFile = File<MatrixRecord>;
 
-impl Values<'_> {
-    /// Number of entries.
-    pub fn len(&self) -> usize {
-        match self {
-            Values::F32(v) => v.len(),
-            Values::F64(v) => v.len(),
-        }
+impl PartFile {
+    fn blocks(&self) -> Result<&[Block]> {
+        self.section("blocks")
     }
 
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
+    fn values(&self) -> Result<Values<'_>> {
+        Ok(match self.record.precision {
+            Precision::F32 => Values::F32(self.section("values")?),
+            Precision::F64 => Values::F64(self.section("values")?),
+        })
     }
 
-    /// Entry `i`.
-    pub fn get(&self, i: usize) -> f64 {
-        match self {
-            Values::F32(v) => f64::from(v[i]),
-            Values::F64(v) => v[i],
-        }
+    /// Rows and columns of the sparse blocks; files of version 1.0 have none.
+    fn structure(&self) -> Result<&[u32]> {
+        if self.has("sparse") { self.section("sparse") } else { Ok(&[]) }
+    }
+
+    fn areas(&self) -> Result<&[f64]> {
+        self.counted_section("areas", self.record.elements as usize)
+    }
+
+    fn row_errors(&self) -> Result<&[f64]> {
+        self.counted_section("row_errors", self.record.elements as usize)
     }
 }
 
-/// Writes a matrix: its blocks, its entries, and per row the area A_i and the estimated sum over j of |error of F_ij|.
-pub fn write(
-    path: &Path,
-    provenance: Provenance,
-    record: MatrixRecord,
-    blocks: &[Block],
-    values: Values<'_>,
-    areas: &[f64],
-    row_errors: &[f64],
-) -> Result<Outcome> {
-    let writer = Writer::new(Kind::Matrix)
-        .section("blocks", blocks)
-        .section("areas", areas)
-        .section("row_errors", row_errors);
-    match values {
-        Values::F32(v) => writer.section("values", v),
-        Values::F64(v) => writer.section("values", v),
-    }
-    .write(path, provenance, record)
-}
-
-/// A mapped matrix file.
+/// A mapped matrix: one file, or all parts of one.
 #[derive(Debug)]
 pub struct Matrix {
-    file: File<MatrixRecord>,
+    /// By part; one, unless all parts of a matrix were opened.
+    files: Vec<PartFile>,
+    /// Sums over the files.
+    row_errors: Vec<f64>,
 }
 
 impl Matrix {
-    /// Maps and checks a matrix file.
+    /// Maps and checks a matrix file, which must hold the whole matrix.
     pub fn open(path: &Path) -> Result<Self> {
-        let matrix = Self { file: File::open(path, Kind::Matrix)? };
-        matrix.check()?;
-        Ok(matrix)
+        Self::open_all(&[path])
+    }
+
+    /// Maps and checks a matrix file that may be a part of a matrix: to be described or combined, not to be taken for the
+    /// whole.
+    pub fn open_part(path: &Path) -> Result<Self> {
+        let file = File::open(path, Kind::Matrix)?;
+        check::file(&file)?;
+        let row_errors = file.row_errors()?.to_vec();
+        Ok(Self { files: vec![file], row_errors })
     }
 
     /// Refuses a matrix that was not computed for the mesh with this digest.
@@ -191,29 +113,32 @@ impl Matrix {
         Err(Error::Mismatch { first: self.path().into(), second: mesh_path.into(), detail, remedy })
     }
 
-    /// The matrix's own part of the header.
+    /// The matrix's own part of the header; of several files that of the first.
     pub fn record(&self) -> &MatrixRecord {
-        &self.file.record
+        &self.files[0].record
     }
 
-    /// Where the file comes from.
+    /// Where the file comes from; of several files the first.
     pub fn provenance(&self) -> &Provenance {
-        &self.file.provenance
+        &self.files[0].provenance
     }
 
-    /// Identity of the file.
+    /// Identity of the file; of several files the digest of their digests.
     pub fn digest(&self) -> Digest {
-        self.file.digest()
+        match &self.files[..] {
+            [file] => file.digest(),
+            files => Digest::of(&files.iter().flat_map(|f| f.digest().0).collect::<Vec<u8>>()),
+        }
     }
 
-    /// Path it was opened by.
+    /// Path it was opened by; of several files that of the first part.
     pub fn path(&self) -> &Path {
-        self.file.path()
+        self.files[0].path()
     }
 
-    /// Length of the file in bytes.
+    /// Length of the file, or of all files, in bytes.
     pub fn length(&self) -> u64 {
-        self.file.length()
+        self.files.iter().map(File::length).sum()
     }
 
     /// Number of rows.
@@ -221,45 +146,40 @@ impl Matrix {
         self.record().elements as usize
     }
 
-    /// Blocks, in the order of their entries.
-    pub fn blocks(&self) -> Result<&[Block]> {
-        self.file.section("blocks")
+    /// Number of blocks.
+    pub fn block_count(&self) -> Result<usize> {
+        self.files.iter().map(|f| Ok(f.blocks()?.len())).sum()
     }
 
-    /// All entries.
-    pub fn values(&self) -> Result<Values<'_>> {
-        Ok(match self.record().precision {
-            Precision::F32 => Values::F32(self.file.section("values")?),
-            Precision::F64 => Values::F64(self.file.section("values")?),
-        })
+    /// Number of stored entries; each pair once.
+    pub fn stored_entries(&self) -> Result<usize> {
+        self.files.iter().map(|f| Ok(f.values()?.len())).sum()
+    }
+
+    /// All blocks with their entries, file after file.
+    pub fn views(&self) -> Result<Vec<BlockView<'_>>> {
+        let mut all = Vec::with_capacity(self.block_count()?);
+        for file in &self.files {
+            all.extend(views(file.blocks()?, file.values()?, file.structure()?));
+        }
+        Ok(all)
     }
 
     /// Areas A_i of the elements.
     pub fn areas(&self) -> Result<&[f64]> {
-        self.file.counted_section("areas", self.element_count())
+        self.files[0].areas()
     }
 
     /// Estimated sum over j of |error of F_ij|, per row i.
     pub fn row_errors(&self) -> Result<&[f64]> {
-        self.file.counted_section("row_errors", self.element_count())
+        Ok(&self.row_errors)
     }
 
     /// Calls `visit(i, j, S_ij)` for every stored entry: each pair once with i <= j where the matrix is symmetric.
     pub fn for_each(&self, mut visit: impl FnMut(usize, usize, f64)) -> Result<()> {
-        let values = self.values()?;
-        for block in self.blocks()? {
-            let mut at = block.offset as usize;
-            for row in 0..block.rows as usize {
-                let first = if block.kind() == Ok(BlockKind::Triangle) { row } else { 0 };
-                for column in first..block.columns as usize {
-                    visit(
-                        block.row_start as usize + row,
-                        block.column_start as usize + column,
-                        values.get(at),
-                    );
-                    at += 1;
-                }
-            }
+        for file in &self.files {
+            views(file.blocks()?, file.values()?, file.structure()?)
+                .for_each(|view| view.for_each(&mut visit));
         }
         Ok(())
     }
@@ -276,94 +196,5 @@ impl Matrix {
             }
         })?;
         Ok(sums.iter().zip(areas).map(|(sum, area)| sum / area).collect())
-    }
-
-    /// Refuses what this version has no use for: one part taken for the whole would silently lose light.
-    fn check_is_whole(&self) -> Result<()> {
-        let record = self.record();
-        let refuse = |part: &str, found: String, expected: &str, remedy: &str| {
-            Err(Error::format(self.path(), part, found, expected, remedy))
-        };
-        if (record.part, record.parts) != (0, 1) {
-            let found = format!("part {} of {}", record.part, record.parts);
-            return refuse("header", found, "a whole matrix", "compute the matrix in one file");
-        }
-        if record.extended {
-            let remedy = "this program is older than the file: update it";
-            return refuse("header", "extended true".into(), "extended false", remedy);
-        }
-        Ok(())
-    }
-
-    fn check(&self) -> Result<()> {
-        self.check_is_whole()?;
-        let elements = u64::from(self.record().elements);
-        let values = self.values()?;
-        let mut stored = 0u64;
-        for (i, block) in self.blocks()?.iter().enumerate() {
-            let part = format!("block {i}");
-            let kind = block.kind().map_err(|code| {
-                let remedy = "this program is older than the file: update it";
-                Error::format(
-                    self.path(),
-                    part.as_str(),
-                    format!("storage kind {code}"),
-                    "0 (dense) or 1 (triangle)",
-                    remedy,
-                )
-            })?;
-            let rows_end = u64::from(block.row_start) + u64::from(block.rows);
-            let columns_end = u64::from(block.column_start) + u64::from(block.columns);
-            let (ordered, place) = match (kind, self.record().symmetric) {
-                (BlockKind::Dense, true) => {
-                    (rows_end <= u64::from(block.column_start), "a place above the diagonal of")
-                }
-                (BlockKind::Dense, false) => (true, "a place within"),
-                (BlockKind::Triangle, true) => {
-                    let square = block.row_start == block.column_start && block.rows == block.columns;
-                    (square, "a square on the diagonal of")
-                }
-                (BlockKind::Triangle, false) => (false, "dense blocks, as the matrix is not symmetric, of"),
-            };
-            if rows_end > elements || columns_end > elements || !ordered {
-                let expected = format!("{place} {elements} rows");
-                return Err(self.file.damaged(&part, format!("{block:?}"), expected));
-            }
-            if block.offset != stored {
-                return Err(self.file.damaged(
-                    &part,
-                    format!("offset {}", block.offset),
-                    format!("{stored}"),
-                ));
-            }
-            stored += block.stored();
-        }
-        if stored != values.len() as u64 {
-            let found = format!("{} entries", values.len());
-            return Err(self.file.damaged("values", found, format!("{stored}, as the blocks say")));
-        }
-        let usable = |x: f64| x.is_finite() && x >= 0.0;
-        let bad = match values {
-            Values::F32(v) => v.iter().position(|&x| !usable(x.into())),
-            Values::F64(v) => v.iter().position(|&x| !usable(x)),
-        };
-        if let Some(at) = bad {
-            return Err(self.file.damaged(
-                "values",
-                format!("{} at {at}", values.get(at)),
-                "finite entries of at least 0",
-            ));
-        }
-        if let Some(i) = self.areas()?.iter().position(|&a| !(a.is_finite() && a > 0.0)) {
-            return Err(self.file.damaged("areas", format!("{} at {i}", self.areas()?[i]), "areas above 0"));
-        }
-        if let Some(i) = self.row_errors()?.iter().position(|&e| !usable(e)) {
-            return Err(self.file.damaged(
-                "row_errors",
-                format!("{} at {i}", self.row_errors()?[i]),
-                "errors of at least 0",
-            ));
-        }
-        Ok(())
     }
 }

@@ -95,8 +95,8 @@ impl Report {
     }
 }
 
-/// Peak resident memory of this process in bytes, as Linux tells it.
-fn peak_memory_bytes() -> u64 {
+/// Peak resident memory of this process in bytes, as Linux tells it; 0 elsewhere.
+pub fn peak_memory_bytes() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
     let kibibytes = line.and_then(|rest| rest.trim().trim_end_matches("kB").trim().parse::<u64>().ok());

@@ -47,6 +47,7 @@ fn split(items: &mut [Item], start: usize, clusters: &mut Vec<Cluster>) {
     let end = (start + items.len()) as u32;
     clusters.push(Cluster { start: start as u32, end, first_child: 0, second_child: 0 });
     if items.len() <= LEAF {
+        sort_leaf(items);
         return;
     }
     let middle = partition(items);
@@ -55,6 +56,16 @@ fn split(items: &mut [Item], start: usize, clusters: &mut Vec<Cluster>) {
     split(first, start, clusters);
     clusters[own].second_child = clusters.len() as u32;
     split(second, start + middle, clusters);
+}
+
+/// Orders the elements of a leaf so that halves of it, and halves of those, are close together too.
+fn sort_leaf(items: &mut [Item]) {
+    if items.len() > 2 {
+        partition(items);
+        let (first, second) = items.split_at_mut(items.len() / 2);
+        sort_leaf(first);
+        sort_leaf(second);
+    }
 }
 
 /// Sorts the items into two parts, both not empty, and returns the length of the first.

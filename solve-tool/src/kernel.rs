@@ -9,11 +9,13 @@
 //! by that; a processor without fused multiply-add (before 2013) gets the same numbers slowly.
 #![allow(unsafe_code)]
 
+use interchange::matrix::BlockView;
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::{
     __m256d, _mm_loadu_ps, _mm256_cvtps_pd, _mm256_fmadd_pd, _mm256_loadu_pd, _mm256_set1_pd,
     _mm256_setzero_pd, _mm256_storeu_pd,
 };
+use std::ops::Range;
 
 /// Columns handled side by side; a row sum is this many partial sums until its end. One AVX register.
 pub(crate) const LANES: usize = 4;
@@ -93,6 +95,35 @@ pub(crate) fn add_rows<const K: usize, T: Entry>(
     while row < end {
         add_strip::<1, K, T>(rows, row, values, x, y, base);
         row += 1;
+    }
+}
+
+/// Adds what rows `rows` of a sparse block contribute to S x, entry by entry; `y` as in [`add_rows`].
+pub(crate) fn add_sparse_rows<const K: usize, T: Entry>(
+    view: &BlockView<'_>,
+    rows: Range<usize>,
+    values: &[T],
+    x: [&[f64]; K],
+    y: &mut [Vec<f64>; K],
+    base: usize,
+) {
+    let column_start = view.block.column_start as usize;
+    for row in rows {
+        let i = view.block.row_start as usize + row;
+        let x_row: [f64; K] = std::array::from_fn(|k| x[k][i]);
+        let mut sums = [0.0; K];
+        for (&column, &s) in view.sparse_row(row).iter().zip(&values[view.row_entries(row)]) {
+            let (j, s): (usize, f64) = (column_start + column as usize, s.into());
+            for k in 0..K {
+                sums[k] += s * x[k][j];
+                if i != j {
+                    y[k][j - base] += s * x_row[k];
+                }
+            }
+        }
+        for k in 0..K {
+            y[k][i - base] += sums[k];
+        }
     }
 }
 

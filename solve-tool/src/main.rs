@@ -26,8 +26,9 @@ struct Cli {
 enum Command {
     /// Solve for the radiosity of every element
     Solve {
-        /// Exchange matrix (.ff)
-        matrix: PathBuf,
+        /// Exchange matrix (.ff), or all files of one computed in shards
+        #[arg(required = true)]
+        matrix: Vec<PathBuf>,
         /// The mesh it was computed for
         #[arg(long, value_name = "MESH")]
         mesh: PathBuf,

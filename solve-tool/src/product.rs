@@ -10,7 +10,7 @@ mod one_way;
 pub(crate) mod rows;
 
 use crate::kernel::{self, Entry, ROWS, Rows};
-use interchange::matrix::{Block, BlockKind, Matrix, Values};
+use interchange::matrix::{Block, BlockKind, BlockView, Matrix, Values, views};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -26,8 +26,7 @@ const REDUCTION_ROWS: usize = 1024;
 pub struct Product<'a> {
     elements: usize,
     symmetric: bool,
-    blocks: &'a [Block],
-    values: Values<'a>,
+    views: Vec<BlockView<'a>>,
     tasks: Vec<Task>,
 }
 
@@ -50,22 +49,31 @@ struct Piece {
 impl<'a> Product<'a> {
     /// The product with a mapped matrix.
     pub fn new(matrix: &'a Matrix) -> interchange::Result<Self> {
-        let (elements, blocks, values) = (matrix.element_count(), matrix.blocks()?, matrix.values()?);
-        Ok(Self::from_blocks(elements, matrix.record().symmetric, blocks, values))
+        let symmetric = matrix.record().symmetric;
+        Ok(Self::with_symmetry(matrix.element_count(), symmetric, matrix.views()?))
     }
 
-    /// The product with blocks in memory that stand for their mirror images too; they must lie within `elements` rows,
-    /// and `values` must hold their entries.
+    /// The product with full blocks in memory that stand for their mirror images too; they must lie within `elements`
+    /// rows, and `values` must hold their entries.
     pub fn from_parts(elements: usize, blocks: &'a [Block], values: Values<'a>) -> Self {
         Self::from_blocks(elements, true, blocks, values)
     }
 
-    /// The product with blocks in memory; without symmetry all must be dense and give every entry there is.
+    /// The product with full blocks in memory; without symmetry all must be dense and give every entry there is.
     pub fn from_blocks(elements: usize, symmetric: bool, blocks: &'a [Block], values: Values<'a>) -> Self {
-        let stored: u64 = blocks.iter().map(Block::stored).sum();
-        debug_assert_eq!(stored, values.len() as u64, "blocks and values disagree");
+        Self::with_symmetry(elements, symmetric, views(blocks, values, &[]).collect())
+    }
+
+    /// The product with blocks that lie within `elements` rows and stand for their mirror images too.
+    pub fn from_views(elements: usize, views: Vec<BlockView<'a>>) -> Self {
+        Self::with_symmetry(elements, true, views)
+    }
+
+    fn with_symmetry(elements: usize, symmetric: bool, views: Vec<BlockView<'a>>) -> Self {
+        let stored: u64 = views.iter().map(|view| view.block.stored()).sum();
         let quota = MIN_TASK_ENTRIES.max(stored.div_ceil(MAX_TASKS));
-        Self { elements, symmetric, blocks, values, tasks: partition(blocks, quota) }
+        let tasks = partition(&views, quota);
+        Self { elements, symmetric, views, tasks }
     }
 
     /// The same product for vectors that are 0 outside `sources`, of which only the `wanted` rows are asked for; the
@@ -80,7 +88,8 @@ impl<'a> Product<'a> {
         let keep = |task: &Task| {
             let mut kept = Task::default();
             for piece in &task.pieces {
-                let block = &self.blocks[piece.block as usize];
+                let view = &self.views[piece.block as usize];
+                let block = &view.block;
                 let columns = block.column_start as usize..(block.column_start + block.columns) as usize;
                 // Runs of strips of the kernel's height, so that their sums keep their order.
                 let mut run: Option<(u32, u32)> = None;
@@ -91,14 +100,14 @@ impl<'a> Product<'a> {
                         (Some((start, _)), true) => Some((start, end)),
                         (None, true) => Some((first, end)),
                         (Some((start, stop)), false) => {
-                            kept.add(piece.block as usize, block, start, stop);
+                            kept.add(piece.block as usize, view, start, stop);
                             None
                         }
                         (None, false) => None,
                     };
                 }
                 if let Some((start, stop)) = run {
-                    kept.add(piece.block as usize, block, start, stop);
+                    kept.add(piece.block as usize, view, start, stop);
                 }
             }
             kept
@@ -110,8 +119,8 @@ impl<'a> Product<'a> {
     /// Entries that a pass reads.
     pub fn entries_read(&self) -> u64 {
         let read = |piece: &Piece| {
-            let block = &self.blocks[piece.block as usize];
-            (piece.first..piece.end).map(|row| row_entries(block, row)).sum::<u64>()
+            let view = &self.views[piece.block as usize];
+            (piece.first..piece.end).map(|row| row_entries(view, row)).sum::<u64>()
         };
         self.tasks.iter().flat_map(|task| &task.pieces).map(read).sum()
     }
@@ -128,23 +137,14 @@ impl<'a> Product<'a> {
 
     /// Number of stored entries; each pair once.
     pub fn stored_entries(&self) -> usize {
-        self.values.len()
+        self.views.iter().map(|view| view.values.len()).sum()
     }
 
-    /// Calls `visit(i, j, S_ij)` for every stored entry until it says to stop: each pair once with i <= j where the
-    /// matrix is symmetric.
+    /// Calls `visit(i, j, S_ij)` for every stored entry, each pair once with i <= j, until it says to stop.
     pub fn for_each_until(&self, mut visit: impl FnMut(usize, usize, f64) -> std::ops::ControlFlow<()>) {
-        for block in self.blocks {
-            let mut at = block.offset as usize;
-            for row in 0..block.rows as usize {
-                let first = if block.kind() == Ok(BlockKind::Triangle) { row } else { 0 };
-                for column in first..block.columns as usize {
-                    let (i, j) = (block.row_start as usize + row, block.column_start as usize + column);
-                    if visit(i, j, self.values.get(at)).is_break() {
-                        return;
-                    }
-                    at += 1;
-                }
+        for view in &self.views {
+            if view.try_for_each(&mut visit).is_break() {
+                return;
             }
         }
     }
@@ -167,19 +167,13 @@ impl<'a> Product<'a> {
         if self.symmetric {
             return self.apply(x);
         }
-        let one = |x: &&[f64]| match self.values {
-            Values::F32(values) => self.sum_tasks([*x], |task| self.run_transposed(task, values, x)),
-            Values::F64(values) => self.sum_tasks([*x], |task| self.run_transposed(task, values, x)),
-        };
-        x.iter().flat_map(one).collect()
+        x.iter().flat_map(|x| self.sum_tasks([*x], |task| self.run_transposed(task, x))).collect()
     }
 
     fn apply_some<const K: usize>(&self, x: [&[f64]; K]) -> [Vec<f64>; K] {
-        match (self.values, self.symmetric) {
-            (Values::F32(values), true) => self.sum_tasks(x, |task| self.run(task, values, x)),
-            (Values::F64(values), true) => self.sum_tasks(x, |task| self.run(task, values, x)),
-            (Values::F32(values), false) => self.sum_tasks(x, |task| self.run_one_way(task, values, x)),
-            (Values::F64(values), false) => self.sum_tasks(x, |task| self.run_one_way(task, values, x)),
+        match self.symmetric {
+            true => self.sum_tasks(x, |task| self.run(task, x)),
+            false => self.sum_tasks(x, |task| self.run_one_way(task, x)),
         }
     }
 
@@ -206,29 +200,51 @@ impl<'a> Product<'a> {
         })
     }
 
-    fn run<const K: usize, T: Entry>(&self, task: &Task, values: &[T], x: [&[f64]; K]) -> [Vec<f64>; K] {
+    fn run<const K: usize>(&self, task: &Task, x: [&[f64]; K]) -> [Vec<f64>; K] {
         let mut y = std::array::from_fn(|_| vec![0.0; task.span.len()]);
         for piece in &task.pieces {
-            let block = &self.blocks[piece.block as usize];
-            let rows = Rows {
-                first: piece.first as usize,
-                count: (piece.end - piece.first) as usize,
-                row_start: block.row_start as usize,
-                column_start: block.column_start as usize,
-                columns: block.columns as usize,
-                triangle: block.kind() == Ok(BlockKind::Triangle),
-                offset: block.offset as usize,
-            };
-            kernel::add_rows(&rows, values, x, &mut y, task.span.start);
+            let view = &self.views[piece.block as usize];
+            match view.values {
+                Values::F32(values) => run_piece(piece, view, values, x, &mut y, task.span.start),
+                Values::F64(values) => run_piece(piece, view, values, x, &mut y, task.span.start),
+            }
         }
         y
     }
 }
 
+fn run_piece<const K: usize, T: Entry>(
+    piece: &Piece,
+    view: &BlockView<'_>,
+    values: &[T],
+    x: [&[f64]; K],
+    y: &mut [Vec<f64>; K],
+    base: usize,
+) {
+    let block = &view.block;
+    if block.kind() == Ok(BlockKind::Sparse) {
+        kernel::add_sparse_rows(view, piece.first as usize..piece.end as usize, values, x, y, base);
+        return;
+    }
+    let rows = Rows {
+        first: piece.first as usize,
+        count: (piece.end - piece.first) as usize,
+        row_start: block.row_start as usize,
+        column_start: block.column_start as usize,
+        columns: block.columns as usize,
+        triangle: block.kind() == Ok(BlockKind::Triangle),
+        offset: 0,
+    };
+    kernel::add_rows(&rows, values, x, y, base);
+}
+
 /// Entries that row `row` of the block stores.
-fn row_entries(block: &Block, row: u32) -> u64 {
-    let before = if block.kind() == Ok(BlockKind::Triangle) { row } else { 0 };
-    u64::from(block.columns - before)
+fn row_entries(view: &BlockView<'_>, row: u32) -> u64 {
+    match view.block.kind() {
+        Ok(BlockKind::Sparse) => view.row_entries(row as usize).len() as u64,
+        Ok(BlockKind::Triangle) => u64::from(view.block.columns - row),
+        _ => u64::from(view.block.columns),
+    }
 }
 
 /// How many of a run of elements are marked, in constant time.
@@ -250,21 +266,22 @@ impl Counted {
 }
 
 /// Cuts the blocks into tasks of about `quota` entries, at multiples of the kernel's rows.
-fn partition(blocks: &[Block], quota: u64) -> Vec<Task> {
+fn partition(views: &[BlockView<'_>], quota: u64) -> Vec<Task> {
     let mut tasks = Vec::new();
     let mut task = Task::default();
     let mut filled = 0;
-    for (index, block) in blocks.iter().enumerate() {
+    for (index, view) in views.iter().enumerate() {
+        let block = &view.block;
         let mut first = 0;
         while first < block.rows {
             // Take rows until the quota is met.
             let mut end = first;
             while end < block.rows && filled < quota {
                 let next = (end + ROWS as u32).min(block.rows);
-                filled += (end..next).map(|row| row_entries(block, row)).sum::<u64>();
+                filled += (end..next).map(|row| row_entries(view, row)).sum::<u64>();
                 end = next;
             }
-            task.add(index, block, first, end);
+            task.add(index, view, first, end);
             first = end;
             if filled >= quota {
                 tasks.push(std::mem::take(&mut task));
@@ -279,7 +296,8 @@ fn partition(blocks: &[Block], quota: u64) -> Vec<Task> {
 }
 
 impl Task {
-    fn add(&mut self, index: usize, block: &Block, first: u32, end: u32) {
+    fn add(&mut self, index: usize, view: &BlockView<'_>, first: u32, end: u32) {
+        let block = &view.block;
         let rows = block.row_start + first..block.row_start + end;
         // A triangle's rows hold nothing to the left of the diagonal.
         let triangle = block.kind() == Ok(BlockKind::Triangle);

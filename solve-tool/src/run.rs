@@ -35,8 +35,8 @@ const MOST_NAMES: usize = 8;
 /// What `solve` is asked to do.
 #[derive(Debug, Clone)]
 pub struct SolveRequest {
-    /// The exchange matrix.
-    pub matrix: PathBuf,
+    /// The exchange matrix, or all its shards.
+    pub matrix: Vec<PathBuf>,
     /// The mesh it was computed for.
     pub mesh: PathBuf,
     /// Materials in place of the table beside the mesh.
@@ -89,8 +89,8 @@ impl SolveRequest {
 
     fn inputs(&self) -> impl Iterator<Item = &Path> {
         let optional = [&self.materials, &self.thermal, &self.start].map(Option::as_ref);
-        let given = [Some(&self.matrix), Some(&self.mesh)].into_iter().chain(optional);
-        given.flatten().map(PathBuf::as_path)
+        let given = self.matrix.iter().chain([&self.mesh]).chain(optional.into_iter().flatten());
+        given.map(PathBuf::as_path)
     }
 }
 
@@ -99,7 +99,7 @@ pub fn run(request: &SolveRequest) -> Result<Finish> {
     refuse_input(&request.output, request.inputs())?;
     let mut report = Report::new(TOOL, VERSION);
     let (mesh, _, mesh_digest) = report.phase("read mesh", || Mesh::read(&request.mesh))?;
-    let matrix = report.phase("map matrix", || Matrix::open(&request.matrix))?;
+    let matrix = report.phase("map matrix", || Matrix::open_all(&request.matrix))?;
     matrix.belongs_to(&request.mesh, mesh_digest, mesh.element_count())?;
     let thermal = request.thermal.as_ref().map(|path| thermal::read(path, &mesh)).transpose()?;
     let (channels, materials_digest) = match &thermal {

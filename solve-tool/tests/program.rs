@@ -5,7 +5,8 @@
 mod room;
 
 use assert_cmd::Command;
-use interchange::matrix::{self, Block, BlockKind, Matrix, Values};
+use interchange::atomic_write::Partial;
+use interchange::matrix::{self, Block, BlockKind, Matrix, MatrixRecord, MatrixWriter, PackedBlock, Values};
 use interchange::solution::Solution;
 use room::Room;
 use std::path::Path;
@@ -205,6 +206,41 @@ fn foreign_cut_and_damaged_files_are_refused() {
     std::fs::remove_file(&room.matrix).unwrap();
     let (code, message) = solve(&room, &output, &[]);
     assert!(code == 1 && message.contains("room.ff"), "{message}");
+}
+
+/// The shards of a matrix, in any order, are as good as the whole; some of them are not.
+#[test]
+fn shards_are_taken_together_or_refused_by_name() {
+    let room = Room::new([0.5, 0.8, 0.9], 1e-9);
+    let whole = Matrix::open(&room.matrix).unwrap();
+    let parts = [room.path("1.ff"), room.path("2.ff")];
+    let views = whole.views().unwrap();
+    for (part, path) in parts.iter().enumerate() {
+        let record = MatrixRecord { part: part as u32, parts: 2, ..whole.record().clone() };
+        let partial = Partial::create(path).unwrap();
+        let areas = whole.areas().unwrap();
+        let mut writer = MatrixWriter::create(partial, whole.provenance().clone(), record, areas).unwrap();
+        for view in views.iter().skip(part).step_by(2) {
+            writer.push(&PackedBlock::copy_of(view)).unwrap();
+        }
+        writer.finish(&[0.5e-9; 6]).unwrap();
+    }
+    let run = |matrices: &[&Path], output: &Path| {
+        let mut command = tool();
+        command.arg("solve").args(matrices).arg("--mesh").arg(&room.mesh).arg("-o").arg(output);
+        let done = command.output().unwrap();
+        (done.status.code().unwrap(), String::from_utf8(done.stderr).unwrap())
+    };
+    let (one, both) = (room.path("one.sol"), room.path("both.sol"));
+    assert_eq!(run(&[&room.matrix], &one), (0, String::new()));
+    assert_eq!(run(&[&parts[1], &parts[0]], &both), (0, String::new()));
+    let (one, both) = (Solution::read(&one).unwrap().0, Solution::read(&both).unwrap().0);
+    for (a, b) in one.radiosity.iter().flatten().zip(both.radiosity.iter().flatten()) {
+        assert!((a - b).abs() <= 1e-12 * a, "{a} {b}");
+    }
+    let (code, message) = run(&[&parts[1]], &room.path("none.sol"));
+    assert!(code == 1 && message.contains("2.ff") && message.contains("part 1 is missing"), "{message}");
+    assert!(message.contains("formfactor-tool merge") && !room.path("none.sol").exists(), "{message}");
 }
 
 /// The same bytes for any number of threads, and a second run leaves the file alone.

@@ -4,7 +4,7 @@
 mod common;
 
 use common::{Scene, assert_all_close, channel, grey, random, random_scene};
-use interchange::matrix::Values;
+use interchange::matrix::{BlockKind, PackedBlock, Precision, Values};
 use proptest::prelude::*;
 use solve_tool::bound::{Amplification, Proof};
 use solve_tool::components::Components;
@@ -201,6 +201,48 @@ fn product_is_the_definition_for_any_blocks() {
                     scene.exchange.iter().map(|row| row.iter().zip(*x).map(|(s, x)| s * x).sum()).collect();
                 assert_all_close(&y, &want, 1e-13);
             }
+        }
+    }
+}
+
+/// Blocks that leave out their zeros, from one file or from two.
+#[test]
+fn product_of_sparse_blocks_is_the_definition() {
+    let scene = random_scene(67, 1.0, 3);
+    let kept = |i: usize, j: usize| (i * 31 + j * 31 + i * j).is_multiple_of(7);
+    let s = |i: usize, j: usize| if kept(i, j) { scene.exchange[i][j] } else { 0.0 };
+    let mut next = random(10);
+    let x: Vec<f64> = (0..67).map(|_| next() - 0.5).collect();
+    let want: Vec<f64> = (0..67).map(|i| (0..67).map(|j| s(i, j) * x[j]).sum()).collect();
+    let ranges = [0..20, 20..50, 50..67];
+    let mut packed = Vec::new();
+    for (k, rows) in ranges.iter().enumerate() {
+        for columns in &ranges[k..] {
+            let triangle = rows == columns;
+            let entries: Vec<f64> = rows
+                .clone()
+                .flat_map(|i| columns.clone().map(move |j| (i, j)))
+                .filter(|&(i, j)| !triangle || j >= i)
+                .map(|(i, j)| s(i as usize, j as usize))
+                .collect();
+            let (rows, columns) = (rows.clone(), columns.clone());
+            packed.push(PackedBlock::new(rows, columns, triangle, &entries, Precision::F64, true));
+        }
+    }
+    let sparse = packed.iter().filter(|p| p.block.kind() == Ok(BlockKind::Sparse)).count();
+    assert_eq!(sparse, packed.len(), "a seventh of the entries");
+    let product = Product::from_views(67, packed.iter().map(PackedBlock::view).collect());
+    assert_all_close(&product.apply(&[&x])[0], &want, 1e-13);
+
+    // Methods that take rows and columns one by one, and products that leave out black rows, see the same matrix.
+    let errors = vec![0.0; 67];
+    let system = solve_tool::system::System::from_parts(product, &scene.areas, &errors, 0.0);
+    let channels = std::array::from_fn(|c| random_channel(67, 0.9, 60 + c as u64));
+    let exact = solve(&system, &channels, Solver::Direct, 1e-13).unwrap();
+    for solver in [Solver::Cg, Solver::Jacobi, Solver::GaussSeidel, Solver::Southwell, Solver::Gmres] {
+        let solved = solve(&system, &channels, solver, 1e-12).unwrap();
+        for (got, want) in solved.channels.iter().zip(&exact.channels) {
+            assert_all_close(&got.radiosity, &want.radiosity, 1e-9);
         }
     }
 }

@@ -2,6 +2,7 @@
 //! have written it. Each message names the file, the part and what was found.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use interchange::container::{Kind, Writer};
 use interchange::digest::Digest;
 use interchange::ids::{FaceId, GroupId, MaterialId, NodeId, VertexId};
 use interchange::materials::MaterialTable;
@@ -137,7 +138,7 @@ fn matrices_that_break_an_invariant_are_refused() {
     }
     assert_refused(write(&record, &[dense], &[0.1], &[1.0], &[0.0, 0.0]), &path, "areas", "1 values");
     for (found, changed) in [
-        ("part 1 of 2", MatrixRecord { part: 1, parts: 2, ..record.clone() }),
+        ("part 2 of 2; part 1 is missing", MatrixRecord { part: 1, parts: 2, ..record.clone() }),
         ("part 0 of 0", MatrixRecord { parts: 0, ..record.clone() }),
         ("extended true", MatrixRecord { extended: true, ..record.clone() }),
     ] {
@@ -155,6 +156,54 @@ fn matrices_that_break_an_invariant_are_refused() {
     let triangle = Block::new(BlockKind::Triangle, 0..2, 0..2, 0);
     let opened = write(&one_way, &[triangle], &[0.0, 0.1, 0.0], &[1.0, 1.0], &[0.0, 0.0]);
     assert_refused(opened, &path, "block 0", "dense blocks");
+}
+
+#[test]
+fn sparse_blocks_that_break_an_invariant_are_refused() {
+    let folder = tests::folder();
+    let path = folder.path().join("bad.ff");
+    let record = MatrixRecord {
+        elements: 6,
+        mesh: Digest::of(b"mesh"),
+        precision: Precision::F64,
+        symmetric: true,
+        extended: false,
+        tolerance: 1e-4,
+        part: 0,
+        parts: 1,
+    };
+    let write = |blocks: &[Block], values: &[f64], structure: &[u32]| {
+        Writer::new(Kind::Matrix)
+            .section("blocks", blocks)
+            .section("areas", &[1.0; 6])
+            .section("row_errors", &[0.0; 6])
+            .section("values", values)
+            .section("sparse", structure)
+            .write(&path, provenance(), record.clone())
+            .unwrap();
+        Matrix::open(&path)
+    };
+    let above = |entries| Block::sparse(0..2, 2..6, entries, 0);
+    let square = |entries| Block::sparse(1..3, 1..3, entries, 0);
+    let cases: [(&str, Block, usize, &[u32]); 10] = [
+        ("row starts", above(2), 2, &[1, 1, 2, 0, 3]),
+        ("row starts", above(2), 2, &[0, 2, 1, 0, 3]),
+        ("row starts", above(2), 2, &[0, 1, 1, 0, 3]),
+        ("row starts", above(2), 2, &[0, 3, 2, 0, 3]),
+        ("columns of row 0", above(2), 2, &[0, 2, 2, 3, 3]),
+        ("columns of row 1", above(2), 2, &[0, 1, 2, 0, 4]),
+        ("columns of row 1", square(2), 2, &[0, 1, 2, 0, 0]),
+        ("row_start: 1", Block::sparse(1..3, 2..6, 2, 0), 2, &[0, 1, 2, 0, 1]),
+        ("4 items", above(2), 2, &[0, 1, 2, 0]),
+        ("2 entries", above(1), 2, &[0, 1, 1, 0]),
+    ];
+    for (found, block, entries, structure) in cases {
+        assert_refused(write(&[block], &vec![0.1; entries], structure), &path, "", found);
+    }
+    write(&[above(2)], &[0.1, 0.1], &[0, 1, 2, 0, 3]).expect("good sparse rows are taken");
+    write(&[square(2)], &[0.1, 0.1], &[0, 1, 2, 1, 1]).expect("a good sparse square is taken");
+    // A number of entries that is no more than a claim.
+    assert_refused(write(&[above(u32::MAX)], &[], &[0, 0, 0]), &path, "values", "0 entries");
 }
 
 #[test]

@@ -2,9 +2,12 @@
 //! is damaged, and the file shown there byte by byte is the file that is written.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+use interchange::atomic_write::Partial;
+use interchange::digest::Digest;
 use interchange::materials::{Material, MaterialTable};
-use interchange::matrix::Matrix;
+use interchange::matrix::{Matrix, MatrixRecord, MatrixWriter, PackedBlock, Precision};
 use interchange::mesh::Mesh;
+use interchange::provenance::Provenance;
 use interchange::solution::Solution;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -144,13 +147,17 @@ fn assert_same_matrix(got: &Value, path: &Path) {
     assert_numbers("tolerance", &got["record"]["tolerance"], [record.tolerance]);
     assert_numbers("areas", &sections["areas"], matrix.areas().unwrap().iter().copied());
     assert_numbers("row_errors", &sections["row_errors"], matrix.row_errors().unwrap().iter().copied());
-    let blocks = matrix.blocks().unwrap().iter().flat_map(|b| {
+    let views = matrix.views().unwrap();
+    let blocks = views.iter().map(|view| view.block).flat_map(|b| {
         let head = [b.row_start, b.rows, b.column_start, b.columns, b.code, b.rank].map(f64::from);
         head.into_iter().chain([b.offset as f64])
     });
     assert_numbers("blocks", &sections["blocks"], blocks);
-    let values = matrix.values().unwrap();
-    assert_numbers("values", &sections["values"], (0..values.len()).map(|i| values.get(i)));
+    let values = views.iter().flat_map(|view| (0..view.values.len()).map(|i| view.values.get(i)));
+    assert_numbers("values", &sections["values"], values);
+    let structure: Vec<f64> = views.iter().flat_map(|view| view.structure).map(|&x| x.into()).collect();
+    // Files of version 1.0 have no such section.
+    assert_numbers("sparse", sections.get("sparse").unwrap_or(&Value::Array(Vec::new())), structure);
     // Sums in another order: a few ulp per term.
     let sums = matrix.row_sums().unwrap();
     assert_eq!(got["row_sums"].as_array().map(Vec::len), Some(sums.len()));
@@ -246,6 +253,49 @@ fn python_reads_what_the_tools_write() {
     assert_same_mesh(&json(&reader, &given.path("mesh")), &given.path("mesh"));
 }
 
+/// The sparse block that FORMAT.md shows, and a sparse square on the diagonal between two full blocks.
+#[test]
+fn python_reads_sparse_blocks() {
+    let folder = tests::folder();
+    let path = folder.path().join("sparse.ff");
+    let record = MatrixRecord {
+        elements: 20,
+        mesh: Digest::of(b"mesh"),
+        precision: Precision::F64,
+        symmetric: true,
+        extended: false,
+        tolerance: 1e-4,
+        part: 0,
+        parts: 1,
+    };
+    let partial = Partial::create(&path).unwrap();
+    let areas: Vec<f64> = (1..=20).map(f64::from).collect();
+    let mut writer = MatrixWriter::create(partial, Provenance::new("test", "1"), record, &areas).unwrap();
+    let mut shown = [0.0; 20];
+    (shown[3], shown[17]) = (0.25, 0.5);
+    let mut square = [0.0; 36];
+    (square[1], square[20]) = (0.125, 0.75);
+    for (rows, columns, entries) in [
+        (0..2, 0..2, &[0.0, 0.1, 0.0][..]),
+        (2..6, 10..15, &shown),
+        (8..16, 8..16, &square),
+        (8..10, 18..20, &[0.2, 0.3, 0.4, 0.5]),
+    ] {
+        let triangle = rows == columns;
+        writer.push(&PackedBlock::new(rows, columns, triangle, entries, Precision::F64, true)).unwrap();
+    }
+    let codes: Vec<u32> = writer.blocks().iter().map(|block| block.code).collect();
+    assert_eq!(codes, [1, 2, 2, 0]);
+    writer.finish(&[0.0; 20]).unwrap();
+    let got = json(&reader(folder.path()), &path);
+    assert_same_matrix(&got, &path);
+    let text = tests::text(&tests::root().join("interchange/FORMAT.md"));
+    assert!(text.contains("the 7 items `0 1 1 1 2` `3 2`"));
+    assert_eq!(got["sections"]["sparse"].as_array().unwrap()[..7], [0, 1, 1, 1, 2, 3, 2].map(Value::from));
+    // S(2, 13) over A of either.
+    assert_numbers("row sum 2", &got["row_sums"][2], [0.25 / 3.0]);
+}
+
 #[test]
 fn files_of_version_1_0_load() {
     let folder = tests::folder();
@@ -254,7 +304,7 @@ fn files_of_version_1_0_load() {
     assert_eq!(MaterialTable::read(&files.materials).unwrap().0, two_squares::materials());
     assert_eq!(Solution::read(&files.solution).unwrap().0, two_squares::solution());
     let matrix = Matrix::open(&files.matrix).unwrap();
-    assert_eq!(matrix.values().unwrap().get(0), two_squares::FORM_FACTOR);
+    assert_eq!(matrix.views().unwrap()[0].values.get(0), two_squares::FORM_FACTOR);
     assert_same(&reader(folder.path()), &files);
 }
 

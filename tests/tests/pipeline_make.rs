@@ -321,3 +321,37 @@ fn clean_removes_what_was_made_for_this_scene_and_nothing_else() {
     pipeline.make(&["clean", "all"]).expect_code(0);
     assert_eq!(pipeline.log(), ALL);
 }
+
+const MERGE: &str = "formfactor-tool merge";
+
+#[test]
+fn shards_are_made_and_merged_and_an_edit_reruns_what_it_touches() {
+    let mut pipeline = Pipeline::new();
+    pipeline.variables.push("SHARDS=3".into());
+    let shards = [COMPUTE; 3];
+    let all = [&[MATERIALS, BUILD], &shards[..], &[MERGE, SOLVE, RENDER]].concat();
+    pipeline.expect(&[], &all);
+    for part in 1..=3 {
+        assert!(pipeline.path(&format!("out/room.{part}of3.ff")).exists(), "part {part}");
+    }
+    pipeline.edit("paint.mtl", "Kd 0.5 0.5 0.5", "Kd 0.6 0.5 0.5");
+    pipeline.expect(&[], &[MATERIALS, SOLVE, RENDER]);
+    pipeline.edit("room.obj", "v 1 1 0", "v 1 2 0");
+    pipeline.expect(&[], &all);
+    // One part taken away is made again, alone, and is the same: merging finds nothing new to read.
+    pipeline.remove("out/room.2of3.ff");
+    pipeline.expect(&[], &[COMPUTE, MERGE]);
+    pipeline.remove("out/room.ff");
+    pipeline.expect(&[], &[MERGE, SOLVE]);
+    // Side by side, with another flag.
+    let done = pipeline.make(&["-j", "3", "FF_FLAGS=--tolerance 0.1"]).expect_code(0);
+    assert_eq!(pipeline.log().len(), 3 + 3, "{}", done.stdout);
+    assert!(done.stdout.contains("--shard 3/3 --tolerance 0.1"), "{}", done.stdout);
+    pipeline.make(&["clean"]).expect_code(0);
+    let left = std::fs::read_dir(pipeline.path("out")).unwrap().count();
+    assert_eq!(left, 0, "clean leaves nothing");
+    for bad in ["0", "-1", "two", "1.5", "10000", ""] {
+        let done = pipeline.make(&[&format!("SHARDS={bad}")]);
+        assert!(done.code == Some(2) && done.stderr.contains("SHARDS"), "{bad:?}: {}", done.stderr);
+    }
+}

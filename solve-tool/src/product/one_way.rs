@@ -3,45 +3,45 @@
 
 use super::{Product, Task};
 use crate::kernel::Entry;
+use interchange::matrix::Values;
 
 /// Partial sums of a row, an order the compiler can keep in vector registers.
 const LANES: usize = 8;
 
 impl Product<'_> {
     /// What a task adds to S x, on its span.
-    pub(super) fn run_one_way<const K: usize, T: Entry>(
-        &self,
-        task: &Task,
-        values: &[T],
-        x: [&[f64]; K],
-    ) -> [Vec<f64>; K] {
+    pub(super) fn run_one_way<const K: usize>(&self, task: &Task, x: [&[f64]; K]) -> [Vec<f64>; K] {
         let mut y = std::array::from_fn(|_| vec![0.0; task.span.len()]);
-        self.for_rows(task, values, |row, column, entries| {
+        self.for_rows(task, |row, column, entries| {
             for k in 0..K {
-                y[k][row - task.span.start] += dot(entries, &x[k][column..]);
+                let x = &x[k][column..];
+                y[k][row - task.span.start] += match entries {
+                    Values::F32(entries) => dot(entries, x),
+                    Values::F64(entries) => dot(entries, x),
+                };
             }
         });
         y
     }
 
     /// What a task adds to the transpose of S times x, on its span.
-    pub(super) fn run_transposed<T: Entry>(&self, task: &Task, values: &[T], x: &[f64]) -> [Vec<f64>; 1] {
+    pub(super) fn run_transposed(&self, task: &Task, x: &[f64]) -> [Vec<f64>; 1] {
         let mut y = vec![0.0; task.span.len()];
-        self.for_rows(task, values, |row, column, entries| {
+        self.for_rows(task, |row, column, entries| {
             let sums = &mut y[column - task.span.start..];
-            sums.iter_mut().zip(entries).for_each(|(y, &s)| *y += s.into() * x[row]);
+            sums.iter_mut().take(entries.len()).enumerate().for_each(|(j, y)| *y += entries.get(j) * x[row]);
         });
         [y]
     }
 
     /// Calls `visit(row, first column, entries)` for each row of the task's dense blocks.
-    fn for_rows<T: Entry>(&self, task: &Task, values: &[T], mut visit: impl FnMut(usize, usize, &[T])) {
+    fn for_rows(&self, task: &Task, mut visit: impl FnMut(usize, usize, Values<'_>)) {
         for piece in &task.pieces {
-            let block = &self.blocks[piece.block as usize];
-            let columns = block.columns as usize;
+            let view = &self.views[piece.block as usize];
+            let (block, columns) = (&view.block, view.block.columns as usize);
             for row in piece.first..piece.end {
-                let start = block.offset as usize + row as usize * columns;
-                let entries = &values[start..start + columns];
+                let start = row as usize * columns;
+                let entries = view.values.slice(start..start + columns);
                 visit((block.row_start + row) as usize, block.column_start as usize, entries);
             }
         }

@@ -1,7 +1,7 @@
 //! Single rows and columns of the stored matrix, for the methods that take one element at a time.
 
 use super::Product;
-use interchange::matrix::{Block, BlockKind};
+use interchange::matrix::{Block, BlockKind, BlockView};
 
 /// Which blocks hold entries of which row and column.
 #[derive(Debug)]
@@ -20,14 +20,14 @@ struct Lists {
 }
 
 impl Lists {
-    fn new(elements: usize, blocks: &[Block], range: impl Fn(&Block) -> std::ops::Range<u32>) -> Self {
+    fn new(elements: usize, views: &[BlockView<'_>], range: impl Fn(&Block) -> std::ops::Range<u32>) -> Self {
         let mut starts = vec![0u32; elements + 1];
-        blocks.iter().flat_map(&range).for_each(|i| starts[i as usize + 1] += 1);
+        views.iter().flat_map(|view| range(&view.block)).for_each(|i| starts[i as usize + 1] += 1);
         (0..elements).for_each(|i| starts[i + 1] += starts[i]);
         let mut next = starts.clone();
         let mut list = vec![0; starts[elements] as usize];
-        for (index, block) in blocks.iter().enumerate() {
-            for i in range(block) {
+        for (index, view) in views.iter().enumerate() {
+            for i in range(&view.block) {
                 list[next[i as usize] as usize] = index as u32;
                 next[i as usize] += 1;
             }
@@ -44,7 +44,7 @@ impl<'a> RowIndex<'a> {
     /// Indexes the blocks.
     pub fn new(product: &'a Product<'a>) -> Self {
         let lists =
-            |range: fn(&Block) -> std::ops::Range<u32>| Lists::new(product.elements, product.blocks, range);
+            |range: fn(&Block) -> std::ops::Range<u32>| Lists::new(product.elements, &product.views, range);
         let by_row = lists(|b| b.row_start..b.row_start + b.rows);
         let by_column = lists(|b| b.column_start..b.column_start + b.columns);
         Self { product, by_row, by_column }
@@ -76,35 +76,49 @@ impl<'a> RowIndex<'a> {
 
     fn stored_row(&self, i: usize, mut visit: impl FnMut(usize, f64)) {
         for &index in self.by_row.of(i) {
-            let block = &self.product.blocks[index as usize];
-            let (row, columns) = (i - block.row_start as usize, block.columns as usize);
-            let (first, at) = row_place(block, row);
-            for column in first..columns {
-                visit(block.column_start as usize + column, self.product.values.get(at + column - first));
+            let view = &self.product.views[index as usize];
+            let (row, start) = (i - view.block.row_start as usize, view.block.column_start as usize);
+            if view.block.kind() == Ok(BlockKind::Sparse) {
+                for (&column, at) in view.sparse_row(row).iter().zip(view.row_entries(row)) {
+                    visit(start + column as usize, view.values.get(at));
+                }
+                continue;
+            }
+            let (first, at) = row_place(&view.block, row);
+            for column in first..view.block.columns as usize {
+                visit(start + column, view.values.get(at + column - first));
             }
         }
     }
 
     fn stored_column(&self, i: usize, mut visit: impl FnMut(usize, f64)) {
         for &index in self.by_column.of(i) {
-            let block = &self.product.blocks[index as usize];
-            let column = i - block.column_start as usize;
-            let triangle = block.kind() == Ok(BlockKind::Triangle);
-            let rows = if triangle { column + 1 } else { block.rows as usize };
+            let view = &self.product.views[index as usize];
+            let block = &view.block;
+            let (column, start) = (i - block.column_start as usize, block.row_start as usize);
+            let kind = block.kind();
+            let rows = if kind == Ok(BlockKind::Triangle) { column + 1 } else { block.rows as usize };
             for row in 0..rows {
+                if kind == Ok(BlockKind::Sparse) {
+                    // Columns rise within a row.
+                    if let Ok(place) = view.sparse_row(row).binary_search(&(column as u32)) {
+                        visit(start + row, view.values.get(view.row_entries(row).start + place));
+                    }
+                    continue;
+                }
                 let (first, at) = row_place(block, row);
-                visit(block.row_start as usize + row, self.product.values.get(at + column - first));
+                visit(start + row, view.values.get(at + column - first));
             }
         }
     }
 }
 
-/// First stored column of row `row` of a block, and where its entry lies in the values.
+/// First stored column of row `row` of a full block, and where its entry lies among the block's.
 fn row_place(block: &Block, row: usize) -> (usize, usize) {
-    let (columns, offset) = (block.columns as usize, block.offset as usize);
+    let columns = block.columns as usize;
     match block.kind() {
         // Row k of a triangle holds columns - k entries.
-        Ok(BlockKind::Triangle) => (row, offset + row * (2 * columns + 1 - row) / 2),
-        _ => (0, offset + row * columns),
+        Ok(BlockKind::Triangle) => (row, row * (2 * columns + 1 - row) / 2),
+        _ => (0, row * columns),
     }
 }

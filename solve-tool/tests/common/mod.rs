@@ -1,10 +1,11 @@
 //! Systems with known answers, built in code.
 #![allow(dead_code, missing_docs, clippy::unwrap_used, clippy::panic)]
 
+use geometry::gather::{Gatherer, Scratch};
 use geometry::occluder::Occluder;
-use geometry::pair::{self, Accuracy};
 use geometry::patch::Patch;
-use geometry::visible::Scratch;
+use geometry::quadrature::{Strength, polygon_rule};
+use geometry::unoccluded;
 use glam::DVec3;
 use interchange::matrix::{Block, BlockKind, Values};
 use rayon::prelude::*;
@@ -87,29 +88,41 @@ impl Scene {
         Self::of_patches(&patches, &wall)
     }
 
-    /// Exact exchange of planar patches, `wall` standing between those that it separates.
+    /// Exchange of planar patches: exact where they lie in one room; between rooms, with the plane x = 1 and its `wall`
+    /// between them, gathered at points, the mean of both directions.
     pub fn of_patches(patches: &[Patch], wall: &[Vec<DVec3>]) -> Self {
-        let wall: Vec<Occluder> = wall.iter().cloned().filter_map(Occluder::new).collect();
-        let accuracy =
-            Accuracy { unoccluded: 1e-12, occluded: 1e-7, least_factor: 0.0, most_evaluations: 100_000 };
-        let exchange: Vec<Vec<f64>> = (0..patches.len())
+        let n = patches.len();
+        let room = |patch: &Patch| patch.centroid.x + 1e-9 * patch.plane.normal.x > 1.0;
+        let corners = || patches.iter().map(|patch| patch.corners.clone()).collect();
+        let gatherer = Gatherer::new(wall.iter().cloned().filter_map(Occluder::new).collect(), corners());
+        let rows: Vec<Vec<f64>> = (0..n)
             .into_par_iter()
             .map(|i| {
-                let (mut blockers, mut scratch) = (Vec::new(), Scratch::default());
                 let p = &patches[i];
-                let row = (0..=i).map(|j| {
-                    let q = &patches[j];
-                    let between = (p.centroid.x - 1.0) * (q.centroid.x - 1.0) < 0.0;
-                    let candidates = wall.iter().filter(|_| between);
-                    pair::exchange(p, q, candidates, accuracy, &mut blockers, &mut scratch).0.value
-                });
-                row.collect()
+                let exact = |q: &Patch| {
+                    if room(p) == room(q) { unoccluded::exchange(p, q, 1e-12).0.value } else { 0.0 }
+                };
+                let mut row: Vec<f64> = patches.iter().map(exact).collect();
+                let (mut points, mut weights) = (Vec::new(), Vec::new());
+                if !wall.is_empty() {
+                    polygon_rule(&p.corners, Strength::Product(4), &mut points, &mut weights);
+                }
+                let mut scratch = Scratch::default();
+                for (point, weight) in points.into_iter().zip(weights) {
+                    gatherer.factors(point, p.plane.normal, &mut scratch, &mut |j, factor| {
+                        if room(&patches[j]) != room(p) {
+                            row[j] += weight * factor;
+                        }
+                    });
+                }
+                row
             })
             .collect();
-        let of = |i: usize, j: usize| exchange[i.max(j)][i.min(j)];
+        let of = |i: usize, j: usize| 0.5 * (rows[i][j] + rows[j][i]);
         let areas: Vec<f64> = patches.iter().map(|patch| patch.area).collect();
-        let exchange = (0..areas.len()).map(|i| (0..areas.len()).map(|j| of(i, j)).collect()).collect();
-        Self { row_errors: vec![0.0; areas.len()], areas, exchange }
+        let exchange =
+            (0..n).map(|i| (0..n).map(|j| if i == j { 0.0 } else { of(i, j) }).collect()).collect();
+        Self { row_errors: vec![0.0; n], areas, exchange }
     }
 
     pub fn len(&self) -> usize {

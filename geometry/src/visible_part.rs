@@ -1,0 +1,110 @@
+//! The part of a polygon that a point sees past any number of shadows, exactly: each shadow's half-spaces are cut out of
+//! the visible pieces, and the pieces are summed by Lambert's formula.
+//!
+//! # Precision
+//! Cuts are interpolations along edges; there is no epsilon.
+
+use crate::point_factor::above_horizon;
+use crate::polygon;
+use crate::shadow::{From, HalfSpace, Shadows};
+use glam::DVec3;
+use std::ops::Range;
+
+/// Convex polygons in one flat array, reused from call to call.
+#[derive(Debug, Clone, Default)]
+struct Pieces {
+    points: Vec<DVec3>,
+    ends: Vec<usize>,
+}
+
+impl Pieces {
+    fn clear(&mut self) {
+        self.points.clear();
+        self.ends.clear();
+    }
+
+    fn push(&mut self, polygon: &[DVec3]) {
+        if polygon.len() >= 3 {
+            self.points.extend_from_slice(polygon);
+            self.ends.push(self.points.len());
+        }
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &[DVec3]> {
+        let starts = std::iter::once(&0).chain(&self.ends);
+        starts.zip(&self.ends).map(|(&start, &end)| &self.points[start..end])
+    }
+}
+
+/// Working memory of [`visible_factor`].
+#[derive(Debug, Clone, Default)]
+pub struct Scratch {
+    pieces: Pieces,
+    next: Pieces,
+    rest: Vec<DVec3>,
+    cut: Vec<DVec3>,
+    half_spaces: Vec<HalfSpace>,
+    heights: Vec<f64>,
+}
+
+/// Form factor from a surface element at `point` with unit `normal` to the front of a convex polygon that lies above the
+/// element's horizon, as far as the shadows `which` leave it in sight.
+pub fn visible_factor(
+    point: DVec3,
+    normal: DVec3,
+    corners: &[DVec3],
+    shadows: &Shadows<'_>,
+    which: Range<usize>,
+    from: From,
+    scratch: &mut Scratch,
+) -> f64 {
+    let Scratch { pieces, next, rest, cut, half_spaces, heights } = scratch;
+    pieces.clear();
+    pieces.points.extend(corners.iter().map(|&c| c - point));
+    pieces.ends.push(corners.len());
+    for at in which {
+        if !shadows.half_spaces(at, from, point, half_spaces) {
+            continue;
+        }
+        next.clear();
+        for piece in pieces.iter() {
+            subtract(piece, half_spaces, next, rest, cut, heights);
+        }
+        std::mem::swap(pieces, next);
+        if pieces.ends.is_empty() {
+            return 0.0;
+        }
+    }
+    pieces.iter().map(|piece| above_horizon(DVec3::ZERO, normal, piece)).sum::<f64>().max(0.0)
+}
+
+/// Appends to `out` the parts of a convex piece that lie outside some half-space.
+fn subtract(
+    piece: &[DVec3],
+    half_spaces: &[HalfSpace],
+    out: &mut Pieces,
+    rest: &mut Vec<DVec3>,
+    cut: &mut Vec<DVec3>,
+    heights: &mut Vec<f64>,
+) {
+    let first = (out.points.len(), out.ends.len());
+    rest.clear();
+    rest.extend_from_slice(piece);
+    for space in half_spaces {
+        heights.clear();
+        heights.extend(rest.iter().map(|&r| space.normal.dot(r) + space.offset));
+        if heights.iter().all(|&h| h >= 0.0) {
+            continue;
+        }
+        if heights.iter().all(|&h| h <= 0.0) {
+            // Nothing is hidden after all: the piece stays whole instead of in parts.
+            out.points.truncate(first.0);
+            out.ends.truncate(first.1);
+            out.push(piece);
+            return;
+        }
+        polygon::cut_in_two(rest, heights, cut, &mut out.points);
+        out.ends.push(out.points.len());
+        std::mem::swap(rest, cut);
+    }
+}
