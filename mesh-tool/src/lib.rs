@@ -14,27 +14,42 @@
 #![forbid(unsafe_code)]
 
 pub mod assemble;
+pub mod box_tree;
 pub mod build;
 pub mod clean;
 pub mod cluster;
+pub mod conform;
 pub mod contact;
 pub mod convex;
 pub mod depfile;
+pub mod discontinuity;
+pub mod duplicates;
+pub mod eee;
+pub mod features;
 pub mod frame;
 pub mod given;
+pub mod hidden;
 pub mod info;
 pub mod light;
 pub mod lit;
+pub mod merge_lines;
 pub mod meshed;
 pub mod nodes;
+pub mod orient;
+pub mod outline;
 pub mod patch;
 pub mod places;
 pub mod planar;
 pub mod refine;
+pub mod regions;
 pub mod seeds;
 pub mod sheets;
 pub mod sized;
+pub mod solids;
+pub mod steps;
+pub mod strength;
 pub mod triangulation;
+pub mod wedge;
 
 pub use build::{Options, build, provenance};
 

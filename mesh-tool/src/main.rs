@@ -6,6 +6,8 @@ use interchange::provenance::Provenance;
 use interchange::report::Report;
 use interchange::scene::Scene;
 use interchange::tool::{self, Common, Finish};
+use mesh_tool::discontinuity::Order;
+use mesh_tool::steps::{Off, Skip, Step};
 use mesh_tool::{NAME, Options, VERSION, depfile, info};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -43,12 +45,8 @@ enum Command {
         /// Mesh to write
         #[arg(short, long, value_name = "FILE")]
         output: PathBuf,
-        /// Mesh with triangles whose edges are no longer than this, in the scene's unit of length
-        #[arg(long, value_name = "L", value_parser = tool::positive)]
-        max_edge: Option<f64>,
-        /// Mesh with about this many triangles, smaller where light changes; with --max-edge too, the finer of the two wins
-        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
-        elements: Option<u32>,
+        #[command(flatten)]
+        size: SizeArgs,
     },
     /// Say what is in a mesh or a material table
     Info {
@@ -67,6 +65,47 @@ struct SceneArgs {
     /// Let both sides of this material emit, reflect and receive (besides those the scene's toml lists)
     #[arg(long, value_name = "NAME")]
     two_sided: Vec<String>,
+}
+
+/// What the elements should be.
+#[derive(Debug, Args)]
+struct SizeArgs {
+    /// Mesh with triangles whose edges are no longer than this, in the scene's unit of length
+    #[arg(long, value_name = "L", value_parser = tool::positive)]
+    max_edge: Option<f64>,
+    /// Mesh with about this many triangles, smaller where light changes; with --max-edge too, the finer of the two wins
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    elements: Option<u32>,
+    /// Mesh along the lines where direct light jumps in value (d0: contacts), slope (d1) or curvature (d2) [default: d2,
+    /// with --linear d1]
+    #[arg(long, value_name = "ORDER", value_enum)]
+    discontinuity: Option<Order>,
+    /// Also draw the curves of three edges (slow where there are many edges)
+    #[arg(long)]
+    eee: bool,
+    /// Three nodes an element, for linear interpolation, in place of six
+    #[arg(long)]
+    linear: bool,
+    /// Leave out a step of cleaning
+    #[arg(long, value_name = "STEP", value_enum, value_delimiter = ',')]
+    no_clean: Vec<Step>,
+    /// Do also what provably does not matter
+    #[arg(long, value_name = "NAME", value_enum, value_delimiter = ',')]
+    no_skip: Vec<Skip>,
+}
+
+impl SizeArgs {
+    fn options(&self) -> Options {
+        Options {
+            max_edge: self.max_edge,
+            elements: self.elements,
+            discontinuity: self.discontinuity,
+            eee: self.eee,
+            linear: self.linear,
+            no_clean: Off::new(self.no_clean.clone()),
+            no_skip: Off::new(self.no_skip.clone()),
+        }
+    }
 }
 
 impl SceneArgs {
@@ -94,8 +133,8 @@ fn run(line: &CommandLine) -> anyhow::Result<()> {
                 atomic_write::write_bytes(path, rule.as_bytes())?;
             }
         }
-        Command::Build { scene: args, output, max_edge, elements } => {
-            let options = Options { max_edge: *max_edge, elements: *elements };
+        Command::Build { scene: args, output, size } => {
+            let options = size.options();
             let mut report = Report::new(NAME, VERSION);
             report.flags = options.flags();
             report.flags.extend(args.two_sided.iter().map(|name| format!("--two-sided {name}")));

@@ -3,6 +3,7 @@
 //! Membership is topological: starting outside, the winding number of a sheet changes by one wherever one of its
 //! border edges is crossed. No point-in-polygon test can fall on the wrong side of a sliver that way.
 
+use crate::hidden::HIDDEN;
 use crate::planar::{Border, PlanarGraph};
 use glam::DVec2;
 use interchange::Error;
@@ -116,6 +117,12 @@ impl Triangulation {
         self.regions[self.triangles[triangle].region as usize].iter().copied()
     }
 
+    /// Whether a triangle lies in some sheet and is not hidden.
+    pub fn is_lit(&self, triangle: usize) -> bool {
+        let held = || self.sheets(triangle).filter(|&(_, winding)| winding > 0);
+        held().next().is_some() && held().all(|(sheet, _)| sheet != HIDDEN)
+    }
+
     /// Finds the winding numbers of all triangles from the outside in.
     fn flood(&mut self, graph: &PlanarGraph) {
         self.regions = vec![Vec::new()];
@@ -176,6 +183,13 @@ impl Triangulation {
         }
         self.triangles[triangle].region = region;
     }
+}
+
+/// Where the triangulation puts a point: points with equal places cannot be told apart.
+pub fn grid_place(uv: DVec2) -> [u64; 2] {
+    let Point2 { x, y } = key(uv);
+    // Adding zero makes one of the two zeros.
+    [x + 0.0, y + 0.0].map(f64::to_bits)
 }
 
 /// What spade sees of a point.

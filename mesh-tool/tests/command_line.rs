@@ -42,7 +42,7 @@ fn build_writes_mesh_table_surfaces_and_report() {
     assert_eq!(report["flags"][0], "--elements 200");
     let names: Vec<&str> =
         report["phases"].as_array().unwrap().iter().filter_map(|p| p["name"].as_str()).collect();
-    assert_eq!(names, ["read", "clean", "lines", "triangulate", "assemble", "write"]);
+    assert_eq!(names, ["read", "clean", "regions", "lines", "triangulate", "assemble", "write"]);
 }
 
 #[test]
@@ -137,7 +137,9 @@ fn bad_usage_is_refused_with_exit_code_2() {
         &["--max-edge=inf"],
         &["--elements", "0"],
         &["--elements", "1.5"],
-        &["--discontinuity", "d1"],
+        &["--discontinuity", "d3"],
+        &["--no-clean", "wash"],
+        &["--no-skip", "rope"],
         &["--refine-with", "s.sol"],
         &["--tolerance", "0.1"],
         &["--threads", "0"],
@@ -148,7 +150,7 @@ fn bad_usage_is_refused_with_exit_code_2() {
     assert!(!folder.join("s.mesh").exists());
     let help = text_of(&tool(&folder).args(["build", "--help"]).output().unwrap());
     assert!(
-        help.contains("--max-edge") && !help.contains("--discontinuity") && !help.contains("--refine-with")
+        help.contains("--max-edge") && help.contains("--discontinuity") && !help.contains("--refine-with")
     );
     let compare = tool(&folder).args(["compare", "a.mesh", "b.mesh"]).output().unwrap();
     assert_eq!(compare.status.code(), Some(2));

@@ -13,7 +13,7 @@ const COLUMNS: [&str; 7] = ["area", "B_r", "B_g", "B_b", "H_r", "H_g", "H_b"];
 /// Writes the table to `output` (`.csv`, or `.npy` with the same columns but the key).
 ///
 /// Means run over all elements under a key, both sides of two-sided faces included: `area` is then twice the face's.
-/// Keys without elements (faces that were dropped) have area 0 and zeros.
+/// Hidden parts count with radiosity and irradiance 0. Keys of faces that were dropped have area 0 and zeros.
 pub fn run(solution_path: &Path, mesh_path: &Path, by: By, output: &Path) -> interchange::Result<()> {
     let format = TableFormat::of(output, &[TableFormat::Csv, TableFormat::Npy])?;
     refuse_input(output, [solution_path, mesh_path])?;
@@ -42,7 +42,9 @@ pub fn run(solution_path: &Path, mesh_path: &Path, by: By, output: &Path) -> int
 fn means(mesh: &Mesh, solution: &Solution, grouping: &Grouping) -> Vec<[f64; 7]> {
     let areas: Vec<f64> =
         mesh.element_ids().map(|e| geometry::polygon::area(&mesh.element_corners(e))).collect();
-    let total = grouping.sums(|i| areas[i]);
+    let mut total = grouping.sums(|i| areas[i]);
+    // Hidden parts have no elements and are dark, but they are part of the face.
+    total.iter_mut().zip(&grouping.hidden_areas).for_each(|(area, hidden)| *area += hidden);
     let mut rows: Vec<[f64; 7]> = total.iter().map(|&area| [area, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]).collect();
     for c in 0..3 {
         let radiosity = grouping.sums(|i| areas[i] * solution.radiosity[i][c]);
