@@ -2,18 +2,20 @@
 
 use crate::assemble::assemble;
 use crate::clean::{Cleaned, Face, clean};
+use crate::conform;
 use crate::contact::Pieces;
 use crate::convex::pieces_of_polygon;
 use crate::discontinuity::{self, DrawnLine, Order};
 use crate::frame::Frame;
 use crate::given::as_given;
 use crate::light::Light;
-use crate::meshed::{Drawing, Drawn};
+use crate::meshed::{Drawing, Drawn, Triangles};
 use crate::patch::Patch;
 use crate::regions::{LostEmitter, merged};
 use crate::sheets::{Layer, layers};
 use crate::sized::sized;
 use crate::solids::Solids;
+use crate::solved::{self, Solved};
 use crate::steps::{Off, Skip, Step};
 use crate::strength::strongest;
 use crate::triangulation::Trouble;
@@ -29,7 +31,7 @@ use interchange::scene::Scene;
 use interchange::tables::number;
 use interchange::{Error, Result};
 use rayon::prelude::*;
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 use std::time::Instant;
 
 /// What the elements should be. With no size, tolerance or order of lines the faces are elements as given; with several
@@ -40,6 +42,14 @@ pub struct Options {
     pub max_edge: Option<f64>,
     /// About this many elements in the whole scene, small where light changes; without emitters of equal area.
     pub elements: Option<u32>,
+    /// Interpolating the direct light over the nodes of an element may miss it by this part of the mean light.
+    pub tolerance: Option<f64>,
+    /// Refine the mesh that the other options make by the error of this solution on it.
+    pub refine_with: Option<Solved>,
+    /// Part of the mean irradiance that the solution may miss; none given: [`solved::TOLERANCE`].
+    pub refine_tolerance: Option<f64>,
+    /// Draw the lines of so many of the faces that the solution shows brightest, too.
+    pub sources: u32,
     /// Lines up to this order; none given: as far as the elements can use them.
     pub discontinuity: Option<Order>,
     /// Curves of three edges, too.
@@ -54,7 +64,8 @@ pub struct Options {
 
 impl Options {
     fn meshes(&self) -> bool {
-        self.max_edge.is_some() || self.elements.is_some() || self.discontinuity.is_some()
+        let sized = self.max_edge.is_some() || self.elements.is_some() || self.tolerance.is_some();
+        sized || self.discontinuity.is_some()
     }
 
     /// Highest order of lines that is drawn.
@@ -67,10 +78,13 @@ impl Options {
         let mut flags: Vec<String> = Vec::new();
         flags.extend(self.max_edge.map(|length| format!("--max-edge {}", number(length))));
         flags.extend(self.elements.map(|count| format!("--elements {count}")));
+        flags.extend(self.tolerance.map(|tolerance| format!("--tolerance {}", number(tolerance))));
         flags.extend(self.discontinuity.and_then(|order| {
             let value = clap::ValueEnum::to_possible_value(&order)?;
             Some(format!("--discontinuity {}", value.get_name()))
         }));
+        flags.extend(self.refine_tolerance.map(|t| format!("--refine-tolerance {}", number(t))));
+        flags.extend((self.sources > 0).then(|| format!("--sources {}", self.sources)));
         flags.extend(self.eee.then(|| "--eee".to_owned()));
         flags.extend(self.linear.then(|| "--linear".to_owned()));
         flags.extend(self.no_clean.flags("--no-clean"));
@@ -84,7 +98,11 @@ pub fn provenance(scene: &Scene, options: &Options) -> Provenance {
     let start = Provenance::new(crate::NAME, crate::VERSION);
     let flagged = options.flags().into_iter().fold(start, Provenance::flag);
     let surfaces = Digest::of(scene.materials.surfaces().as_bytes());
-    flagged.input("scene", scene.digest).input("surfaces", surfaces)
+    let start = flagged.input("scene", scene.digest).input("surfaces", surfaces);
+    match &options.refine_with {
+        Some(solved) => start.input("solution", solved.digest),
+        None => start,
+    }
 }
 
 /// Makes the mesh of `scene`.
@@ -139,11 +157,39 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
             .collect::<Result<_>>()?;
         note(report, "lines", start);
         let start = Instant::now();
-        let light = options.elements.and_then(|_| Light::new(&cleaned, &pieces));
+        let lit = options.elements.is_some() || options.tolerance.is_some();
+        let light = lit.then(|| Light::new(&cleaned, &pieces)).flatten();
         let name = |face: u32, trouble: Trouble| name(&cleaned.faces, face, trouble);
         let tolerance = cleaned.places.tolerance();
-        let meshes = sized(scene, &drawings, light.as_ref(), options, tolerance, report, &name)?;
-        patches = drawings.iter().map(Drawing::layer).zip(meshes).collect();
+        let mut meshes = sized(scene, &drawings, light.as_ref(), options, tolerance, report, &name)?;
+        let made = |meshes: &[Triangles]| -> Vec<(&Layer, Patch)> {
+            let patches = drawings.par_iter().zip(meshes).map(|(drawing, mesh)| drawing.patch(mesh));
+            drawings.iter().map(Drawing::layer).zip(patches.collect::<Vec<_>>()).collect()
+        };
+        if let Some(solved) = &options.refine_with {
+            let (base, _) = assemble(scene, cleaned.clone(), &pieces, &made(&meshes), !options.linear);
+            solved.check(&base)?;
+            let sources = solved.brightest(options.sources as usize);
+            let fail =
+                |(layer, trouble): (usize, Trouble)| name(drawings[layer].layer().sheets[0].face, trouble);
+            let asked = options.refine_tolerance.unwrap_or(solved::TOLERANCE);
+            solved.refine(&drawings, &mut meshes, asked, tolerance, report).map_err(fail)?;
+            if !sources.is_empty() && options.order() >= Order::D1 {
+                let mut lines = lines_of(&cleaned, &pieces, sources, options, report);
+                lines = strongest(lines, &cleaned, &pieces, base.element_count() as u32);
+                report.count("lines of secondary sources", lines.len());
+                for (drawing, mesh) in drawings.iter().zip(&mut meshes) {
+                    // Where they tangle with what is there, they are left out.
+                    let drawn = drawing.draw_more(mesh, &lines, tolerance);
+                    report.count("planes without lines of secondary sources", usize::from(drawn.is_err()));
+                }
+            }
+            if off.leaves(Step::Meet) {
+                conform::meet(&drawings, &mut meshes, tolerance);
+            }
+            report.count("elements kept", kept(&base, &meshes));
+        }
+        patches = made(&meshes);
         note(report, "triangulate", start);
     } else {
         let start = Instant::now();
@@ -200,6 +246,28 @@ fn discontinuity_lines(
     }
     let emits = |&face: &u32| cleaned.faces[face as usize].emits;
     let sources: Vec<u32> = (0..cleaned.faces.len() as u32).filter(emits).collect();
+    lines_of(cleaned, pieces, sources, options, report)
+}
+
+/// Elements of `base` that are still among the triangles.
+fn kept(base: &Mesh, meshes: &[Triangles]) -> usize {
+    let bits = |corners: &[DVec3]| -> BTreeSet<[u64; 3]> {
+        corners.iter().map(|corner| corner.to_array().map(f64::to_bits)).collect()
+    };
+    let before: HashSet<BTreeSet<[u64; 3]>> =
+        base.element_ids().map(|e| bits(&base.element_corners(e))).collect();
+    let now = meshes.iter().flat_map(|mesh| mesh.elements().map(|(_, corners)| bits(&corners)));
+    now.filter(|corners| before.contains(corners)).count()
+}
+
+/// Lines of the light of some faces.
+fn lines_of(
+    cleaned: &Cleaned,
+    pieces: &Pieces,
+    sources: Vec<u32>,
+    options: &Options,
+    report: &mut Report,
+) -> Vec<DrawnLine> {
     let skips = &options.no_skip;
     let (order, eee) = (options.order(), options.eee);
     discontinuity::Drawing { scene: cleaned, pieces, sources, order, skips, eee }.lines(report)
@@ -348,7 +416,7 @@ fn edges_of(ring: &[VertexId]) -> impl Iterator<Item = (u32, u32)> + '_ {
 }
 
 /// The smallest angle of a polygon, radians, and the corner it is at.
-fn smallest_angle(corners: &[DVec3]) -> (f64, usize) {
+pub fn smallest_angle(corners: &[DVec3]) -> (f64, usize) {
     let n = corners.len();
     let angle = |k: usize| {
         let (a, b) = (corners[(k + 1) % n] - corners[k], corners[(k + n - 1) % n] - corners[k]);

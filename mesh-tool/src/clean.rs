@@ -51,7 +51,7 @@ pub struct Face {
 }
 
 /// A cleaned scene.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Cleaned {
     /// Places of all corners.
     pub places: Places,

@@ -13,6 +13,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod adaptive;
 pub mod assemble;
 pub mod box_tree;
 pub mod build;
@@ -38,6 +39,7 @@ pub mod nodes;
 pub mod orient;
 pub mod outline;
 pub mod patch;
+pub mod picture;
 pub mod places;
 pub mod planar;
 pub mod refine;
@@ -46,6 +48,7 @@ pub mod seeds;
 pub mod sheets;
 pub mod sized;
 pub mod solids;
+pub mod solved;
 pub mod steps;
 pub mod strength;
 pub mod triangulation;

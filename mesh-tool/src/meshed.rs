@@ -37,6 +37,11 @@ impl Triangles {
         self.winners.iter().flatten().count()
     }
 
+    /// Sheet that holds a triangle.
+    pub fn sheet(&self, triangle: usize) -> Option<u32> {
+        self.winners[triangle]
+    }
+
     /// Points on the edges of the graph that elements have.
     pub fn edge_points(&self) -> impl Iterator<Item = DVec3> + '_ {
         self.edges().flat_map(|(_, ends)| ends)
@@ -176,6 +181,11 @@ impl Drawing {
         })
     }
 
+    /// Unit normal of where the layer looks.
+    pub fn normal(&self) -> DVec3 {
+        if self.layer.reversed { -self.layer.frame.plane.normal } else { self.layer.frame.plane.normal }
+    }
+
     /// The layer.
     pub fn layer(&self) -> &Layer {
         &self.layer
@@ -203,6 +213,29 @@ impl Drawing {
         let refinement = triangles.refinement.clone();
         *triangles = self.owned(refinement, triangulation);
         Ok(true)
+    }
+
+    /// Draws more lines through a mesh; what they do not touch stays as it is.
+    pub fn draw_more(
+        &self,
+        triangles: &mut Triangles,
+        lines: &[DrawnLine],
+        tolerance: f64,
+    ) -> Result<(), Trouble> {
+        let mut refinement = triangles.refinement.clone();
+        let mut any = false;
+        for (index, sheet) in self.layer.sheets.iter().enumerate() {
+            for line in lines.iter().filter(|line| line.face == sheet.face && line.side == sheet.side) {
+                let contact = Contact { sheet: index as u32, source: line.source, order: line.order };
+                refinement.add_line(line.ends, contact, &self.layer.frame);
+                any = true;
+            }
+        }
+        if any {
+            let triangulation = refinement.rearrange(tolerance / self.layer.frame.size)?;
+            *triangles = self.owned(refinement, triangulation);
+        }
+        Ok(())
     }
 
     /// Splits edges of the graph at given points; with `widen`, widens the small angles that this makes.

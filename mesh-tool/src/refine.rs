@@ -8,9 +8,9 @@
 
 use crate::conform::EdgeSplit;
 use crate::frame::{Frame, turn};
-use crate::planar::{PlanarGraph, Point};
+use crate::planar::{Contact, PlanarGraph, Point};
 use crate::triangulation::{Triangle, Triangulation, Trouble, grid_place};
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 use std::collections::{BTreeSet, HashSet};
 
 /// Triangles with a smaller angle are refined, in degrees. Ruppert's bound for termination is 20.7; the floor on the
@@ -142,6 +142,28 @@ impl Refinement {
             self.graph.split_at(*edge, &points);
         }
         if widen { self.widen(first_new) } else { self.graph.triangulate() }
+    }
+
+    /// Adds a line that may cross others; to be followed by [`Refinement::rearrange`].
+    pub fn add_line(&mut self, ends: [DVec3; 2], contact: Contact, frame: &Frame) {
+        let [from, to] = ends
+            .map(|position| self.graph.point(Point { uv: frame.flatten(position), position, place: None }));
+        self.graph.contact(from, to, contact);
+    }
+
+    /// Splits edges where they cross after lines were added; points keep their numbers.
+    pub fn rearrange(&mut self, tolerance: f64) -> Result<Triangulation, Trouble> {
+        let before = self.free.len();
+        self.graph = self.graph.clone().arrange(tolerance)?.0;
+        self.free.resize(self.graph.points.len(), false);
+        let spacing = self.target.spacing;
+        self.sizes.resize(self.graph.points.len(), spacing);
+        for edge in &self.graph.edges {
+            for point in [edge.from, edge.to] {
+                self.free[point as usize] = false;
+            }
+        }
+        self.widen(before)
     }
 
     /// Widens small angles, moving only points from number `first_new` on.
@@ -407,7 +429,7 @@ struct Shape {
 
 /// Adds a free point; its position in space is set when it has stopped moving.
 fn add_free(graph: &mut PlanarGraph, uv: DVec2) {
-    graph.point(Point { uv, position: glam::DVec3::ZERO, place: None });
+    graph.point(Point { uv, position: DVec3::ZERO, place: None });
 }
 
 fn circumcentre(a: DVec2, b: DVec2, c: DVec2) -> Option<DVec2> {

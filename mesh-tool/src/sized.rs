@@ -1,11 +1,11 @@
 //! How many elements, and of which size: what `--max-edge` and `--elements` ask for.
 
+use crate::adaptive;
 use crate::build::Options;
 use crate::conform;
 use crate::light::Light;
 use crate::lit;
 use crate::meshed::{Drawing, Triangles};
-use crate::patch::Patch;
 use crate::steps::Step;
 use crate::triangulation::Trouble;
 use interchange::report::Report;
@@ -31,6 +31,9 @@ const FLOOR: f64 = 0.05;
 /// ... and where only a length is.
 const FINE_FLOOR: f64 = 1e-3;
 
+/// Adaptive meshes start with about this many elements.
+const COARSE: f64 = 80.0;
+
 /// This part of the elements makes a uniform mesh; the others go where light changes.
 const UNIFORM: f64 = 0.35;
 
@@ -43,17 +46,26 @@ pub fn sized(
     tolerance: f64,
     report: &mut Report,
     name: &(impl Fn(u32, Trouble) -> Error + Sync),
-) -> Result<Vec<Patch>> {
+) -> Result<Vec<Triangles>> {
     let max_edge = options.max_edge.unwrap_or(f64::INFINITY);
     // A number of elements is a budget: shape yields to it. A length alone is none.
     let floor = if options.elements.is_some() { FLOOR } else { FINE_FLOOR };
     let meets = options.no_clean.leaves(Step::Meet).then_some(tolerance);
     let search = Search { scene, drawings, max_edge, floor, meets, name };
-    let patches = |meshes: &[Triangles]| -> Vec<Patch> {
-        drawings.par_iter().zip(meshes).map(|(drawing, mesh)| drawing.patch(mesh)).collect()
-    };
+    if let (Some(light), Some(asked)) = (light, options.tolerance) {
+        let most = options.elements.map_or(MOST_ELEMENTS, f64::from);
+        // Start coarse: what is evenly lit stays so.
+        let coarse = (search.area() / (EQUILATERAL * COARSE)).sqrt().min(SPACING_PER_MAX_EDGE * max_edge);
+        let mut meshes = search.mesh(coarse)?.0;
+        let diagonal = search.diagonal();
+        let wish = adaptive::Wish { tolerance: asked, most, linear: options.linear, diagonal };
+        adaptive::refine(light, drawings, &mut meshes, wish, report)
+            .map_err(|(layer, trouble)| name(drawings[layer].layer().sheets[0].face, trouble))?;
+        report.count("planes that do not meet others everywhere", search.meet(&mut meshes));
+        return Ok(meshes);
+    }
     let Some(wanted) = options.elements.map(f64::from) else {
-        return Ok(patches(&search.mesh(SPACING_PER_MAX_EDGE * max_edge)?.0));
+        return Ok(search.mesh(SPACING_PER_MAX_EDGE * max_edge)?.0);
     };
     if let Some(light) = light {
         let spacing = (search.area() / (EQUILATERAL * wanted)).sqrt();
@@ -65,7 +77,7 @@ pub fn sized(
             let found = count(&meshes) as f64;
             // Where light changes nowhere, only a uniform mesh can use up the rest.
             if (found / wanted - 1.0).abs() <= REFINED_TOLERANCE {
-                return Ok(patches(&meshes));
+                return Ok(meshes);
             }
         }
     }
@@ -76,7 +88,7 @@ pub fn sized(
             "the faces and lines need at least about {found} elements, more than the {wanted} asked for"
         ));
     }
-    Ok(patches(&meshes))
+    Ok(meshes)
 }
 
 fn count(meshes: &[Triangles]) -> usize {
@@ -122,6 +134,10 @@ impl<Name: Fn(u32, Trouble) -> Error + Sync> Search<'_, Name> {
     /// Makes planes meet; returns how many could not.
     fn meet(&self, meshes: &mut [Triangles]) -> usize {
         self.meets.map_or(0, |tolerance| conform::meet(self.drawings, meshes, tolerance))
+    }
+
+    fn diagonal(&self) -> f64 {
+        self.drawings.iter().map(|drawing| drawing.layer().frame.size).fold(0.0, f64::max)
     }
 
     fn area(&self) -> f64 {
