@@ -217,3 +217,110 @@ fn convex_room_has_no_lines_and_sweeps_no_wedge() {
     let without = Off::new(vec![Skip::Shaft]);
     assert_eq!(drawn_with(&read("goral_cube.obj"), Order::D2, without, false).0, []);
 }
+
+/// Light by several lamps of unequal reach above boxes: every skip changes only what it says.
+fn lamps_and_boxes() -> String {
+    let lamp = |x: f64, y: f64, half: f64| {
+        polygon_text(
+            "lamp",
+            &[
+                (x - half, y - half, 4.0),
+                (x - half, y + half, 4.0),
+                (x + half, y + half, 4.0),
+                (x + half, y - half, 4.0),
+            ],
+        )
+    };
+    let mut text = format!("{FLOOR}{}{}", lamp(0.3, 0.2, 0.5), lamp(7.9, 8.1, 0.002));
+    let mut first = text.matches("v ").count() + 1;
+    text += "usemtl white\n";
+    for (x, y) in [(-2.0, -1.0), (1.5, 0.7), (2.1, -2.3)] {
+        text += &box_text([x, y, 0.4], [x + 0.73, y + 0.91, 1.3], true, first);
+        first += 8;
+    }
+    text
+}
+
+#[test]
+fn skips_leave_out_only_what_does_not_matter() {
+    let scene = scene_of(&lamps_and_boxes());
+    let (lines, report) = drawn(&scene);
+    for name in [
+        "skipped: wedges that are no silhouette",
+        "skipped: pairs with weak light",
+        "skipped: pairs with nothing between",
+    ] {
+        assert!(report.counters[name] > 0, "{name}: {:?}", report.counters);
+    }
+    // Edges that are no silhouette leave nothing that is not there already, nor do empty shafts.
+    for skip in [Skip::Silhouette, Skip::Shaft] {
+        let (all, _) = drawn_with(&scene, Order::D2, Off::new(vec![skip]), false);
+        let near = |a: &DrawnLine, b: &DrawnLine| {
+            let along = |p: DVec3| {
+                let [q, r] = b.ends;
+                let t = ((p - q).dot(r - q) / (r - q).length_squared()).clamp(0.0, 1.0);
+                p.distance(q.lerp(r, t)) < 1e-9
+            };
+            a.face == b.face && a.source == b.source && a.ends.into_iter().all(along)
+        };
+        for line in &all {
+            assert!(lines.iter().any(|known| near(line, known)), "{skip:?}: {line:?}");
+        }
+    }
+    // The small lamp's lines, where the large one outshines it, are the weak ones.
+    let (all, _) = drawn_with(&scene, Order::D2, Off::new(vec![Skip::Weak]), false);
+    assert!(all.len() > lines.len());
+    let extra = all.iter().filter(|line| !lines.contains(line));
+    assert!(extra.clone().all(|line| line.source == 2), "{:#?}", extra.collect::<Vec<_>>());
+    // Not merged, the segments are as many as the wedges leave.
+    let (all, report) = drawn_with(&scene, Order::D2, Off::new(vec![Skip::Merge]), false);
+    assert_eq!(all.len() as u64, report.counters["wedge segments"]);
+    // A room of black lamps only in a convex box: nothing to skip but everything.
+    let (_, report) = drawn(&scene_of(&aligned_squares()));
+    assert_eq!(report.counters["skipped: pairs with weak light"], 0);
+}
+
+/// Every segment of the reference that carries light lies on our lines.
+#[test]
+fn penumbra_lines_of_the_reference_are_covered() {
+    let (lines, _) = drawn(&read("penumbra.obj"));
+    let text = std::fs::read_to_string(scene_path("../reference/penumbra_discontinuities.csv")).unwrap();
+    let (mut covered, mut dark) = (0, 0);
+    for row in text.lines().filter(|row| row.starts_with("VE") || row.starts_with("EV")) {
+        let numbers: Vec<f64> = row.split(',').skip(4).map(|x| x.parse().unwrap()).collect();
+        let [a, b] = [0, 2].map(|k| DVec3::new(numbers[k], 0.0, numbers[k + 1]));
+        // Along a segment, every place is on some line.
+        let on_line = (0..=20).all(|k| {
+            let p = a.lerp(b, f64::from(k) / 20.0);
+            lines.iter().filter(|line| line.face == 0).any(|line| {
+                let [q, r] = line.ends;
+                let t = ((p - q).dot(r - q) / (r - q).length_squared()).clamp(0.0, 1.0);
+                p.distance(q.lerp(r, t)) < 1e-9
+            })
+        });
+        covered += usize::from(on_line);
+        dark += usize::from(!on_line);
+    }
+    assert_eq!((covered, dark), (32, 0));
+}
+
+/// Three edges parallel to one plane leave a straight line.
+#[test]
+fn three_edges_parallel_to_a_plane_leave_a_straight_line() {
+    let light = [(-1.0, 0.0, 4.0), (-1.0, 1.0, 4.0), (1.0, 1.0, 4.0), (1.0, 0.0, 4.0)];
+    let first = [(0.0, -0.5, 3.0), (0.0, 0.5, 3.0), (-3.0, 0.5, 3.0), (-3.0, -0.5, 3.0)];
+    let second = [(-0.7, -1.0, 2.0), (1.3, 1.0, 2.0), (4.3, -2.0, 2.0), (2.3, -4.0, 2.0)];
+    let text = format!(
+        "{FLOOR}{}{}{}",
+        polygon_text("lamp", &light),
+        polygon_text("white", &first),
+        polygon_text("white", &second)
+    );
+    let scene = scene_of(&text);
+    let (without, _) = drawn(&scene);
+    let (lines, report) = drawn_with(&scene, Order::D2, Off::default(), true);
+    assert!(report.counters["curves of three edges"] > 0);
+    // Straight curves are one chord each, or lie on lines that are there already.
+    let extra = lines.len() - without.len().min(lines.len());
+    assert!(extra as u64 <= report.counters["curves of three edges"], "{extra}");
+}
