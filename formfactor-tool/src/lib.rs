@@ -6,6 +6,13 @@
 #![forbid(unsafe_code)]
 
 pub mod compute;
+pub mod counts;
+pub mod estimator;
+pub mod exact;
 pub mod export;
 pub mod info;
+pub mod scene;
+pub mod skips;
+pub mod store;
 pub mod tile;
+pub mod traversal;

@@ -1,6 +1,7 @@
 //! Command line of the form-factor stage.
 
 use clap::{Parser, Subcommand, ValueEnum};
+use formfactor_tool::skips::Skip;
 use formfactor_tool::{compute, export, info};
 use interchange::grouping::By;
 use interchange::tool::{Common, EXIT_CODES, Finish, exit_code, print_data};
@@ -32,6 +33,9 @@ enum Command {
         /// Method: auto takes the cheapest exact or adaptive rule per pair
         #[arg(long, value_enum, default_value = "auto")]
         method: Method,
+        /// Do this work even where it is provably not needed
+        #[arg(long, value_enum, value_name = "NAME", value_delimiter = ',')]
+        no_skip: Vec<Skip>,
     },
     /// Write the factors F(i -> j) as a table
     Export {
@@ -64,8 +68,8 @@ enum Method {
 
 fn run(cli: Cli) -> anyhow::Result<Finish> {
     match cli.command {
-        Command::Compute { mesh, output, tolerance, method: Method::Auto } => {
-            return compute::run(&compute::Request { mesh, output, tolerance }, &cli.common);
+        Command::Compute { mesh, output, tolerance, method: Method::Auto, no_skip } => {
+            return compute::run(&compute::Request { mesh, output, tolerance, no_skip }, &cli.common);
         }
         Command::Export { matrix, mesh, by, output } => export::run(&matrix, &mesh, by, &output)?,
         Command::Info { file, json } => print_data(&info::describe(&file, json)?)?,

@@ -1,0 +1,49 @@
+//! Work that is provably not needed. Each skip has a name for `--no-skip`, which turns it off: the matrix stays the same
+//! (to the bit, or within its tolerance where a cheaper rule serves).
+
+use clap::ValueEnum;
+
+/// One kind of work left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub enum Skip {
+    /// Two elements of one plane: zero
+    SamePlane,
+    /// An element wholly behind the other's plane: zero
+    Behind,
+    /// A cluster wholly behind the other's plane: its whole block is zero
+    BehindClusters,
+    /// No occluder reaches in front of any other: nothing can block anywhere
+    ConvexEnclosure,
+    /// Nothing reaches into the pair's shaft: no visibility work
+    EmptyShaft,
+    /// One convex blocker covers the pair's shaft: zero
+    Covered,
+    /// Blockers outside a shaft are outside every narrower one
+    InheritedBlockers,
+    /// S is symmetric: each pair is computed once
+    Reciprocity,
+    /// Blocks of zeros are not stored
+    ZeroBlocks,
+    /// Equal relative poses of unoccluded near pairs: computed once
+    EqualPoses,
+    /// Well-separated pairs: cheaper rules than the contour
+    FarRules,
+}
+
+/// Which skips are on.
+#[derive(Debug, Clone, Default)]
+pub struct Skips {
+    off: Vec<Skip>,
+}
+
+impl Skips {
+    /// All but those `off`.
+    pub fn without(off: &[Skip]) -> Self {
+        Self { off: off.to_vec() }
+    }
+
+    /// Whether this kind of work is left out.
+    pub fn has(&self, skip: Skip) -> bool {
+        !self.off.contains(&skip)
+    }
+}
