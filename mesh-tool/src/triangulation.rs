@@ -90,7 +90,7 @@ impl Triangulation {
             .flat_map(|(k, edge)| [((edge.from, edge.to), k as u32), ((edge.to, edge.from), k as u32)])
             .collect();
         // spade counts its outer face as number 0.
-        let triangles = cdt
+        let triangles: Vec<Triangle> = cdt
             .inner_faces()
             .map(|face| {
                 let edges = face.adjacent_edges();
@@ -102,6 +102,14 @@ impl Triangulation {
                 Triangle { corners, neighbours, constraints, region: 0 }
             })
             .collect();
+        // An edge that runs through a point becomes two constraints, of which one may be an edge, too: then the counts
+        // agree, but the border has a gap.
+        let mut found = vec![false; graph.edges.len()];
+        let constraints = triangles.iter().flat_map(|triangle| triangle.constraints);
+        constraints.flatten().for_each(|edge| found[edge as usize] = true);
+        if !triangles.is_empty() && found.contains(&false) {
+            return Err(Trouble::Tangled);
+        }
         let mut triangulation = Triangulation { triangles, regions: Vec::new() };
         triangulation.flood(graph);
         Ok(triangulation)
@@ -210,6 +218,17 @@ mod tests {
             graph.point(Point { uv, position: uv.extend(0.0), place: None })
         });
         graph.ring(&corners, Border { sheet, forward: true });
+    }
+
+    /// Three points in a row, an edge from the first to the last and one from the middle to the last.
+    #[test]
+    fn edge_through_a_point_is_tangled_although_constraints_are_as_many_as_edges() {
+        let mut graph = PlanarGraph::default();
+        square(&mut graph, 0.0, 1.0, 0);
+        let middle = DVec2::new(0.5, 0.0);
+        let middle = graph.point(Point { uv: middle, position: middle.extend(0.0), place: None });
+        graph.border(middle, 1, Border { sheet: 1, forward: true });
+        assert_eq!(graph.triangulate().unwrap_err(), Trouble::Tangled);
     }
 
     #[test]
