@@ -64,7 +64,7 @@ struct Rows {
 /// Writes the table.
 ///
 /// Means run over all elements under a key, both sides of two-sided faces included: `area` is then twice the face's.
-/// Keys without elements (faces that were dropped) have area 0 and zeros.
+/// Hidden parts count with radiosity and irradiance 0. Keys of faces that were dropped have area 0 and zeros.
 pub fn run(request: &ExportRequest) -> interchange::Result<()> {
     let allowed = match request.quantity {
         Quantity::Links => &[TableFormat::Csv][..],
@@ -120,7 +120,7 @@ impl Table<'_> {
             Quantity::Heat => self.heat()?,
             Quantity::Links => Default::default(),
         };
-        columns_of.insert(0, self.grouping.sums(|i| self.areas[i]));
+        columns_of.insert(0, self.total_areas());
         let mut header = vec![self.grouping.title.to_owned(), "area".to_owned()];
         header.extend(columns);
         let row = |key: usize| -> Vec<f64> { columns_of.iter().map(|column| column[key]).collect() };
@@ -133,9 +133,16 @@ impl Table<'_> {
         Ok(Rows { header, keys, rows: order.into_iter().map(row).collect() })
     }
 
+    /// Areas of the keys. Hidden parts have no elements and are dark, but they are part of the face.
+    fn total_areas(&self) -> Vec<f64> {
+        let mut total = self.grouping.sums(|i| self.areas[i]);
+        total.iter_mut().zip(&self.grouping.hidden_areas).for_each(|(area, hidden)| *area += hidden);
+        total
+    }
+
     /// Area-weighted means of a value of the elements.
     fn means(&self, value: impl Fn(usize) -> f64) -> Vec<f64> {
-        let total = self.grouping.sums(|i| self.areas[i]);
+        let total = self.total_areas();
         let sums = self.grouping.sums(|i| self.areas[i] * value(i));
         sums.iter().zip(total).map(|(sum, area)| if area > 0.0 { sum / area } else { 0.0 }).collect()
     }

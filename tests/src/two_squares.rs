@@ -62,6 +62,7 @@ pub fn mesh() -> Mesh {
         groups: vec!["floor".into(), "lamp é".into()],
         materials: vec!["grey".into(), "light".into()],
         input_face_count: 2,
+        ..Mesh::default()
     }
 }
 

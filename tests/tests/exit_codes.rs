@@ -89,10 +89,6 @@ fn bad_usage_is_2() {
 
 /// Flags and subcommands of later versions: unknown until they do something.
 const LATER: &[&str] = &[
-    "mesh-tool build a.obj -o a.mesh --discontinuity d1",
-    "mesh-tool build a.obj -o a.mesh --discontinuity off",
-    "mesh-tool build a.obj -o a.mesh --refine-with a.sol",
-    "mesh-tool build a.obj -o a.mesh --tolerance 0.01",
     "mesh-tool compare a.mesh b.mesh",
     "formfactor-tool import f.npy --mesh a.mesh -o a.ff",
     "solve-tool compare a.sol b.sol",
