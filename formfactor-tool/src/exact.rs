@@ -146,7 +146,8 @@ struct Filling<'e> {
 impl Filling<'_> {
     fn set(&mut self, i: usize, j: usize, found: Exchange) {
         let (row, column) = (i - self.pair.rows.start, j - self.pair.columns.start);
-        self.builder.set(row, column, found.value, found.error);
+        // Far pairs whose points lie on each other's planes sum up to rounding of either sign.
+        self.builder.set(row, column, found.value.max(0.0), found.error);
     }
 
     /// A row of pairs that see each other wholly: far ones together, those that are too near for a rule by the next one.

@@ -324,6 +324,7 @@ impl Mesh {
                 ));
             }
         }
+        in_range("element_faces", self.element_faces.iter().map(|f| f.0), self.faces.len())?;
         in_range("element_inputs", self.element_inputs.iter().copied(), self.input_face_count as usize)?;
         if let Some(i) = self.hidden_areas.iter().position(|&area| !(area.is_finite() && area >= 0.0)) {
             return Err(("hidden_areas", format!("{} at {i}", self.hidden_areas[i])));

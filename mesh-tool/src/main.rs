@@ -104,7 +104,7 @@ struct SizeArgs {
     #[arg(long, value_name = "K", default_value_t = 0, requires = "refine_with")]
     sources: u32,
     /// Mesh along the lines where direct light jumps in value (d0: contacts), slope (d1) or curvature (d2)
-    /// [default: d2, with --linear d1]
+    /// [default: d1]
     #[arg(long, value_name = "ORDER", value_enum)]
     discontinuity: Option<Order>,
     /// Also draw the curves of three edges (slow where there are many edges)
