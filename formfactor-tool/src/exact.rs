@@ -117,7 +117,9 @@ impl Estimator for Exact<'_> {
 
     fn note(&self, report: &mut Report) {
         let distinct = self.poses.as_ref().map_or(0, Poses::distinct);
-        report.count("different poses of near pairs (others skipped)", distinct);
+        let spared = self.poses.as_ref().map_or(0, Poses::spared);
+        report.count("different poses of near pairs", distinct);
+        report.count("near pairs of a pose met before (skipped)", spared);
     }
 }
 
@@ -297,7 +299,9 @@ impl Findings for Sizes<'_> {
 
 /// Per row the sum over its partly occluded pairs of the factors without blockers.
 fn occluded_sizes(scene: &Scene, skips: &Skips, pairs: &[LeafPair]) -> Vec<f64> {
-    let blocked: Vec<&LeafPair> = pairs.iter().filter(|pair| !pair.blockers.is_empty()).collect();
+    // With nothing between them too, where they are not taken for that.
+    let looked_at = |pair: &&LeafPair| !pair.blockers.is_empty() || !skips.has(Skip::EmptyShaft);
+    let blocked: Vec<&LeafPair> = pairs.iter().filter(looked_at).collect();
     let parts: Vec<Sizes<'_>> = blocked
         .par_iter()
         .map_init(Scratch::default, |scratch, pair| {

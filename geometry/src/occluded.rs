@@ -31,6 +31,11 @@ const SMOOTH_ERROR: f64 = 4.0;
 const VARIATION_ERROR: f64 = 0.01;
 /// Most that the variation alone counts.
 const MOST_VARIATION_ERROR: f64 = 3e-5;
+/// Unless that is less than this share of the distance: 0.26 of it were seen as error where the centre agreed by chance.
+const CHANCE: f64 = 0.3;
+/// The same where the error must hold by itself: over triangles and other cells that are not their own mirror image
+/// terms of third order remain, with up to 0.07 v^3 seen where the centre agreed by chance.
+const ODD_ERROR: f64 = 0.1;
 /// Where shadow lines cross a cell, its points may all miss what lies between them: that much of the unblocked
 /// factor is never ruled out.
 const UNSEEN: f64 = 0.02;
@@ -78,6 +83,8 @@ struct Cell {
     shadows: Range<usize>,
     value: f64,
     error: f64,
+    /// Where the error must hold by itself: the error without the credit that holds on average only.
+    doubt: f64,
     /// Rule applied, as a place in [`ORDERS`].
     order: usize,
     /// Whether shadow planes may still cross it.
@@ -87,6 +94,8 @@ struct Cell {
     /// Whether higher orders do not help: there is a bend or a singularity inside or at the border.
     is_rough: bool,
     area: f64,
+    /// Its part in what has to fall: the larger of its shares in the sums of errors and of squared doubts.
+    urgency: f64,
     /// Order of creation: makes the queue's order unique.
     serial: usize,
 }
@@ -104,7 +113,7 @@ impl PartialOrd for Cell {
 }
 impl Ord for Cell {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.error.total_cmp(&other.error).then(other.serial.cmp(&self.serial))
+        self.urgency.total_cmp(&other.urgency).then(other.serial.cmp(&self.serial))
     }
 }
 
@@ -131,8 +140,9 @@ struct Integral<'s, 'a> {
     scratch: &'s mut Scratch,
     wanted: Wanted,
     evaluations: usize,
-    /// Sum of the cells' errors, and number of cells made.
+    /// Sum of the cells' errors, sum of their squared doubts, and number of cells made.
     error: f64,
+    doubt: f64,
     made: usize,
     /// Least and largest value seen in the present cell.
     low: f64,
@@ -169,6 +179,7 @@ pub fn exchange(
         wanted,
         evaluations: 0,
         error: 0.0,
+        doubt: 0.0,
         made: 0,
         low: 0.0,
         high: 0.0,
@@ -189,8 +200,10 @@ pub fn exchange(
     let values = &mut scratch.values;
     values.clear();
     values.extend(scratch.cells.iter().map(|c| (c.value, c.error)));
+    let doubt = scratch.cells.iter().map(|c| c.doubt * c.doubt).sum::<f64>().sqrt();
     values.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let (value, error) = values.iter().fold((0.0, 0.0), |(v, e), &(value, error)| (v + value, e + error));
+    let error = doubt.max(error);
     (Exchange { value, error }, Effort { evaluations, exhausted: error > wanted.tolerance })
 }
 
@@ -203,17 +216,25 @@ impl Integral<'_, '_> {
             self.add(whole);
         }
         loop {
-            if self.error <= self.wanted.tolerance {
-                // The running sum has rounding in it: only a fresh one counts.
+            if self.is_met() {
+                // The running sums have rounding in them: only fresh ones count.
                 self.error = self.scratch.cells.iter().map(|c| c.error).sum();
+                self.doubt = self.scratch.cells.iter().map(|c| c.doubt * c.doubt).sum();
             }
-            if self.error <= self.wanted.tolerance || self.evaluations >= self.wanted.most_evaluations {
+            if self.is_met() || self.evaluations >= self.wanted.most_evaluations {
                 return;
             }
             let Some(cell) = self.scratch.cells.pop() else { return };
             self.error -= cell.error;
+            self.doubt -= cell.doubt * cell.doubt;
             self.improve(cell, planes);
         }
+    }
+
+    /// Whether both the sum of the errors and, should none of the credits have been earned, what doubts of random sign add up
+    /// to are within the tolerance.
+    fn is_met(&self) -> bool {
+        self.error <= self.wanted.tolerance && self.doubt <= self.wanted.tolerance * self.wanted.tolerance
     }
 
     /// Cuts a cell along every plane that crosses it and integrates over the parts.
@@ -262,6 +283,11 @@ impl Integral<'_, '_> {
         let distance = (value - cell.value).abs();
         let decay = if cell.distance > 0.0 { distance / cell.distance } else { 0.0 };
         cell.error = distance * (DECAY_ERROR * decay).clamp(LEAST_DECAY, 1.0);
+        if self.wanted.alone {
+            // Each doubling of the order squares the relative error, should the present distance be small by chance.
+            let size = value.max(cell.value).max(f64::MIN_POSITIVE);
+            cell.doubt = distance.max((cell.distance / size).powi(4) * size);
+        }
         cell.is_rough |= decay > SLOW_DECAY;
         (cell.value, cell.distance) = (value, distance);
         self.keep(cell);
@@ -271,6 +297,8 @@ impl Integral<'_, '_> {
         cell.serial = self.made;
         self.made += 1;
         self.error += cell.error;
+        self.doubt += cell.doubt * cell.doubt;
+        cell.urgency = cell.error.max(cell.doubt * cell.doubt / self.wanted.tolerance.max(f64::MIN_POSITIVE));
         self.scratch.cells.push(cell);
     }
 
@@ -319,13 +347,17 @@ impl Integral<'_, '_> {
         let middle = cell.area * self.at(centre, cell.shadows.clone());
         let distance = (value - middle).abs();
         (cell.value, cell.distance) = (value, distance);
+        let size = value.max(middle).max(f64::MIN_POSITIVE);
+        let variation = (self.high - self.low) * cell.area / size;
+        let odd = ODD_ERROR * variation.powi(3) * size;
         cell.error = if cell.crossed {
             distance.max(UNSEEN * cell.area / self.receiver_area * self.wanted.unblocked)
+        } else if cell.shadows.len() < 2 && self.wanted.alone {
+            distance.max(odd)
         } else if cell.shadows.len() < 2 {
-            let size = value.max(middle).max(f64::MIN_POSITIVE);
-            let variation = (self.high - self.low) * cell.area / size;
-            let varied = (VARIATION_ERROR * variation.powi(4)).min(MOST_VARIATION_ERROR);
-            let smooth = if self.wanted.alone { 1.0 } else { SMOOTH_ERROR * distance / size };
+            let most = MOST_VARIATION_ERROR.max(CHANCE * distance / size);
+            let varied = (VARIATION_ERROR * variation.powi(4)).min(most);
+            let smooth = SMOOTH_ERROR * distance / size;
             (distance * smooth.min(1.0)).max(varied * size)
         } else {
             // Edges of different bodies that seem to cross (EEE) are in no shadow plane: what they let through or take
@@ -335,6 +367,9 @@ impl Integral<'_, '_> {
             cell.is_rough = tip > BENT * distance;
             (KINK * distance).max(if cell.is_rough { CORNER_ERROR * tip } else { 0.0 })
         };
+        if self.wanted.alone {
+            cell.doubt = cell.error.max(distance).max(odd);
+        }
         self.keep(cell);
     }
 

@@ -19,7 +19,8 @@ const EDGE_ROUNDING: f64 = 1e-12;
 type Standing = i8;
 
 /// Where a set stands relative to one face of `body`. A set on the face's plane counts as in front where it looks away from
-/// the body, as behind where it looks into it; a flat body's plane has its front on both sides.
+/// the body, as behind where it looks into it; a flat body's plane has its front on both sides, unless it is the skin of a
+/// solid one: then the set lies outside.
 fn stand(set: Set<'_>, face: &Plane, body: &Body) -> Standing {
     let tolerance = PLANARITY * (body.radius + set.radius);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -29,6 +30,13 @@ fn stand(set: Set<'_>, face: &Plane, body: &Body) -> Standing {
         high = if height > high { height } else { high };
     }
     match (low >= -tolerance, high <= tolerance) {
+        (true, true) if body.is_skin => {
+            if face.normal.dot(body.faces[0].normal) > 0.0 {
+                1
+            } else {
+                -1
+            }
+        }
         (true, true) if body.is_flat() => 1,
         (true, true) => set.normal.map_or(0, |n| if n.dot(face.normal) > 0.0 { 1 } else { -1 }),
         // Some of a mixed set may lie on the plane and look either way.
