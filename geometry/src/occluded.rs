@@ -211,7 +211,7 @@ impl Integral<'_, '_> {
     fn run(&mut self, whole: Cell, planes: &[ShadowPlane]) {
         let demanding = self.wanted.tolerance < UNSEEN * self.wanted.unblocked;
         if demanding && planes.len() <= CUT_AT_ONCE {
-            self.cut_fully(whole, planes);
+            self.cut_fully(whole, planes, planes.len());
         } else {
             self.add(whole);
         }
@@ -237,15 +237,16 @@ impl Integral<'_, '_> {
         self.error <= self.wanted.tolerance && self.doubt <= self.wanted.tolerance * self.wanted.tolerance
     }
 
-    /// Cuts a cell along every plane that crosses it and integrates over the parts.
-    fn cut_fully(&mut self, cell: Cell, planes: &[ShadowPlane]) {
+    /// Cuts a cell along every plane that crosses it and integrates over the parts. Each plane cuts once on the way to a
+    /// part, so `cuts_left` ends it also where a plane through nearly collinear places is too ill defined to have cut cleanly.
+    fn cut_fully(&mut self, cell: Cell, planes: &[ShadowPlane], cuts_left: usize) {
         match self.best_cut(&cell, planes) {
-            Some(plane) => {
+            Some(plane) if cuts_left > 0 => {
                 for part in self.split(&cell, |p| plane.height(p)).into_iter().flatten() {
-                    self.cut_fully(part, planes);
+                    self.cut_fully(part, planes, cuts_left - 1);
                 }
             }
-            None => self.add(Cell { crossed: false, ..cell }),
+            left => self.add(Cell { crossed: left.is_some(), ..cell }),
         }
     }
 
