@@ -4,6 +4,7 @@
 #   make -f pipeline.mk SCENE=path/name.obj OUT=folder    your scene, into folder/name.*
 #   make -f pipeline.mk ERROR=0.01                        a finer picture
 #   make -f pipeline.mk -j 4 SHARDS=4                     the matrix in four parts side by side
+#   make -f pipeline.mk PASSES=2                          elements where the first solution is worst
 #   make -f pipeline.mk test                              the tests
 #   make -f pipeline.mk clean SCENE=... OUT=...           removes what was made for this scene
 #
@@ -35,6 +36,8 @@ SCENE ?= $(ROOT)tests/scenes/cornell_blocks.obj
 OUT   ?= out
 # Wished relative RMS error of the picture: mesh fineness and the stages' tolerances follow from it, see below.
 ERROR ?= 0.02
+# 2: mesh, factors and solution are made twice: half the elements first, then refined where that solution is worst.
+PASSES ?= 1
 # 1: a stage that misses its tolerance (exit 3) stops the pipeline. Otherwise it warns and the pipeline goes on.
 STRICT ?=
 # Above 1: the matrix is computed in so many parts, which make -j runs side by side, and merged; the file is the same.
@@ -78,7 +81,12 @@ endif
 
 # $(call unless,FLAGS,--a --b,DERIVED): DERIVED, unless FLAGS already say --a or --b.
 unless = $(if $(filter $2 $(2:%=%=%),$1),,$3)
-mesh_flags  = $(call unless,$(MESH_FLAGS),--elements --max-edge,--elements $(word 1,$(derived))) $(MESH_FLAGS)
+ifneq ($(filter-out 1 2,$(words $(PASSES)) $(PASSES)),)
+$(error pipeline.mk: PASSES = $(PASSES): expected 1 or 2)
+endif
+twice := $(filter 2,$(PASSES))
+elements    = $(if $(twice),$(shell expr $(word 1,$(derived)) / 2),$(word 1,$(derived)))
+mesh_flags  = $(call unless,$(MESH_FLAGS),--elements --max-edge,--elements $(elements)) $(MESH_FLAGS)
 ff_flags    = $(call unless,$(FF_FLAGS),--tolerance,--tolerance $(word 2,$(derived))) $(FF_FLAGS)
 solve_flags = $(call unless,$(SOLVE_FLAGS),--tolerance,--tolerance $(word 3,$(derived))) $(SOLVE_FLAGS)
 
@@ -140,10 +148,17 @@ program = $(if $(running),$(if $(filter $(built),$($1)),$($1),\
 # Programs and flags as text. The scene's own path is part of it: another scene of the same name is another scene.
 program-text = $(patsubst $(BIN)%,%,$1)
 text.materials = $(call program-text,$(MESH_TOOL)) $(abspath $(SCENE)) $(notdir $(TOML))
-text.mesh = $(call program-text,$(MESH_TOOL)) $(abspath $(SCENE)) $(mesh_flags)
+text.mesh = $(call program-text,$(MESH_TOOL)) $(abspath $(SCENE)) $(mesh_flags) $(refine)
+text.first.mesh = $(call program-text,$(MESH_TOOL)) $(abspath $(SCENE)) $(mesh_flags)
+text.first.ff = $(text.ff)
+text.first.sol = $(text.sol)
 text.ff   = $(call program-text,$(FORMFACTOR_TOOL)) $(ff_flags)
 text.sol  = $(call program-text,$(SOLVE_TOOL)) $(solve_flags)
 text.exr  = $(call program-text,$(SHADE_TOOL)) $(subst $(TOML),$(abspath $(TOML)),$(shade_flags))
+
+# With PASSES=2 the mesh is refined by the solution of the first pass, whose files are called NAME.first.*.
+first  := $(P).first
+refine := $(if $(twice),--refine-with $(first).sol)
 
 # ---- How a stage runs: the one place that knows exit codes -----------------------------------------------------------
 
@@ -179,9 +194,25 @@ $(materials_outputs): $(P).materials.made ; +
 
 # Mesh: the scene's faces cut into elements. Depends on .surfaces and not on the MTL, so colours leave it alone.
 $(P).mesh.made: $(call inputs,$(SCENE)) $(P).surfaces $(P).mesh.flags $(call named,$(MESH_FLAGS)) \
-    $(call program,MESH_TOOL) $(call again,$(P).mesh)
-	$(call stage,$(MESH_TOOL) build $(SCENE) -o $(P).mesh $(mesh_flags))
+    $(if $(twice),$(first).sol) $(call program,MESH_TOOL) $(call again,$(P).mesh)
+	$(call stage,$(MESH_TOOL) build $(SCENE) -o $(P).mesh $(mesh_flags) $(refine))
 $(P).mesh: $(P).mesh.made ; +
+
+# The first of two passes, with the same flags: its elements that need no refinement are in the second mesh, too.
+ifneq ($(twice),)
+$(first).mesh.made: $(call inputs,$(SCENE)) $(P).surfaces $(first).mesh.flags $(call named,$(MESH_FLAGS)) \
+    $(call program,MESH_TOOL) $(call again,$(first).mesh)
+	$(call stage,$(MESH_TOOL) build $(SCENE) -o $(first).mesh $(mesh_flags))
+$(first).mesh: $(first).mesh.made ; +
+$(first).ff.made: $(first).mesh $(first).ff.flags $(call named,$(FF_FLAGS)) \
+    $(call program,FORMFACTOR_TOOL) $(call again,$(first).ff)
+	$(call stage,$(FORMFACTOR_TOOL) compute $(first).mesh -o $(first).ff $(ff_flags))
+$(first).ff: $(first).ff.made ; +
+$(first).sol.made: $(first).ff $(first).mesh $(P).materials $(first).sol.flags $(call named,$(SOLVE_FLAGS)) \
+    $(call program,SOLVE_TOOL) $(call again,$(first).sol)
+	$(call stage,$(SOLVE_TOOL) solve $(first).ff --mesh $(first).mesh --materials $(P).materials -o $(first).sol $(solve_flags))
+$(first).sol: $(first).sol.made ; +
+endif
 
 # Form factors: what every element sees of every other.
 ifeq ($(shards),)
@@ -216,7 +247,7 @@ $(P).exr.made: $(P).sol $(P).mesh $(P).materials $(TOML) $(P).exr.flags $(call n
 $(P).exr $(P).png: $(P).exr.made ; +
 
 # Flags: written first, and only where the text is another one (or the file is missing).
-stages := materials mesh ff sol exr
+stages := materials mesh ff sol exr $(if $(twice),first.mesh first.ff first.sol)
 same    = $(and $(findstring <$(strip $1)>,<$(strip $2)>),$(findstring <$(strip $2)>,<$(strip $1)>))
 $(foreach s,$(stages),$(if $(call same,$(text.$s),$(file <$(P).$s.flags)),,$(P).$s.flags)): FORCE
 $(stages:%=$(P).%.flags): $(P).%.flags:
@@ -246,11 +277,12 @@ test:
 	MAKEFLAGS= cargo test --workspace --manifest-path $(ROOT)Cargo.toml
 
 # Removes what the stages made for this scene, and what a killed stage left half written; nothing else in the folder.
-outputs := $(materials_outputs) $(P).mesh $(P).ff $(P).sol $(P).exr $(P).png
+outputs := $(materials_outputs) $(P).mesh $(P).ff $(P).sol $(P).exr $(P).png \
+  $(addprefix $(P).first.,mesh ff sol materials surfaces)
 hidden  := $(dir $(P)).$(notdir $(P))
 clean:
 	rm -f $(outputs) $(outputs:%=%.report.json)
-	rm -f $(foreach s,$(stages),$(addprefix $(P).$s,.flags .made .made.start .made.new))
+	rm -f $(foreach s,$(stages) first.mesh first.ff first.sol,$(addprefix $(P).$s,.flags .made .made.start .made.new))
 	rm -f $(foreach f,$(outputs:$(P)%=$(hidden)%),$f.*.partial $f.report.json.*.partial $f.*.mode)
 	rm -f $(foreach e,.ff .ff.report.json .ff.made .ff.made.start .ff.made.new,$(P).[1-9]*of[1-9]*$e)
 	rm -f $(addprefix $(hidden).[1-9]*of[1-9]*.ff.,*.partial report.json.*.partial *.mode)

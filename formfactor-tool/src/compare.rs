@@ -85,6 +85,7 @@ impl Difference {
             title: "element",
             labels: vec![String::new(); count],
             key_of_element: (0..count as u32).collect(),
+            hidden_areas: vec![0.0; count],
         };
         let factors = [Factors::new(&sides[0], &elements)?, Factors::new(&sides[1], &elements)?];
         let mut rows = Vec::with_capacity(count);

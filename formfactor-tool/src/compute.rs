@@ -13,7 +13,7 @@ use crate::store::{Packing, Store, StoredTile};
 use crate::traversal::leaf_pairs;
 use interchange::atomic_write::refuse_input;
 use interchange::digest::Digest;
-use interchange::matrix::{BlockKind, MatrixRecord};
+use interchange::matrix::{Block, BlockKind, MatrixRecord};
 use interchange::mesh::Mesh;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
@@ -138,6 +138,10 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     note_rows(&mut report, &store, closed.as_ref(), tolerance);
     estimator.note(&mut report);
     report.count("tests of occluders against shafts of clusters", settled.shaft_tests);
+    report.count("tests of occluders against shafts of clusters (skipped)", settled.shaft_tests_spared);
+    report.count("pairs of one plane, by whole clusters", settled.same_plane);
+    report.count("pairs facing away, by whole clusters", settled.behind);
+    report.count("pairs fully blocked, by whole clusters", settled.covered);
     report.count("tiles", pairs.len());
     report.count("memory bound in bytes", memory.bound as usize);
     report.count("tiles resumed", resumed);
@@ -166,6 +170,10 @@ fn note(report: &mut Report, mesh: &Mesh, scene: &Scene, store: &Store) {
     report.count("bodies that block", scene.bodies.len());
     report.count("convex enclosure (all visibility skipped)", usize::from(scene.convex));
     report.count("pairs", n * (n + 1) / 2);
+    report.count(
+        "pairs taken from their mirror image (skipped)",
+        n * n.saturating_sub(1) / 2 - store.counts.computed_twice,
+    );
     store.counts.note(report);
     report.count("blocks absent", store.absent_blocks);
 }
@@ -175,6 +183,8 @@ pub(crate) fn note_rows(report: &mut Report, store: &Store, closed: Option<&Clos
     let blocks = store.writer.blocks();
     report.count("elements", store.areas.len());
     report.count("blocks", blocks.len());
+    let stored: u64 = blocks.iter().map(Block::stored).sum();
+    report.count("entries stored", stored as usize);
     let sparse = blocks.iter().filter(|block| block.kind() == Ok(BlockKind::Sparse)).count();
     report.count("blocks sparse", sparse);
     let row_sums = store.row_sums();

@@ -14,6 +14,8 @@ pub struct Counts {
     pub behind: usize,
     /// Behind one convex blocker.
     pub covered: usize,
+    /// With nothing reaching into the shaft between them.
+    pub empty_shaft: usize,
     /// Unoccluded, by rule: one point, few, several, many, contour.
     pub unoccluded: [usize; 5],
     /// Partly occluded.
@@ -51,6 +53,7 @@ impl Counts {
         self.same_plane += other.same_plane;
         self.behind += other.behind;
         self.covered += other.covered;
+        self.empty_shaft += other.empty_shaft;
         for (sum, n) in self.unoccluded.iter_mut().zip(other.unoccluded) {
             *sum += n;
         }
@@ -65,6 +68,7 @@ impl Counts {
         report.count("pairs of one plane (skipped)", self.same_plane);
         report.count("pairs facing away (skipped)", self.behind);
         report.count("pairs fully blocked (skipped)", self.covered);
+        report.count("pairs with an empty shaft (visibility skipped)", self.empty_shaft);
         let rules = ["one point", "few points", "several points", "many points", "contour"];
         for (name, number) in rules.iter().zip(self.unoccluded) {
             report.count(&format!("pairs unoccluded, {name}"), number);

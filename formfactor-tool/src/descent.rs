@@ -83,6 +83,7 @@ impl<'a, F: Findings> Descent<'a, '_, F> {
         } else {
             let now = start..scratch.shadows.len();
             if now.is_empty() && still_pending.is_empty() && self.skips.has(Skip::EmptyShaft) {
+                self.counts.empty_shaft += pairs;
                 self.findings.clear(first, second, self.counts);
             } else if self.findings.undecided(first, second) {
                 // Looked at closely enough.
@@ -153,6 +154,7 @@ impl<'a, F: Findings> Descent<'a, '_, F> {
                     return;
                 }
                 View::Clear if self.skips.has(Skip::EmptyShaft) => {
+                    self.counts.empty_shaft += 1;
                     return self.findings.clear(first, second, self.counts);
                 }
                 View::Clear => now = 0..0,

@@ -117,7 +117,9 @@ impl Estimator for Exact<'_> {
 
     fn note(&self, report: &mut Report) {
         let distinct = self.poses.as_ref().map_or(0, Poses::distinct);
-        report.count("different poses of near pairs (others skipped)", distinct);
+        let spared = self.poses.as_ref().map_or(0, Poses::spared);
+        report.count("different poses of near pairs", distinct);
+        report.count("near pairs of a pose met before (skipped)", spared);
     }
 }
 
@@ -146,7 +148,8 @@ struct Filling<'e> {
 impl Filling<'_> {
     fn set(&mut self, i: usize, j: usize, found: Exchange) {
         let (row, column) = (i - self.pair.rows.start, j - self.pair.columns.start);
-        self.builder.set(row, column, found.value, found.error);
+        // Far pairs whose points lie on each other's planes sum up to rounding of either sign.
+        self.builder.set(row, column, found.value.max(0.0), found.error);
     }
 
     /// A row of pairs that see each other wholly: far ones together, those that are too near for a rule by the next one.
@@ -296,7 +299,9 @@ impl Findings for Sizes<'_> {
 
 /// Per row the sum over its partly occluded pairs of the factors without blockers.
 fn occluded_sizes(scene: &Scene, skips: &Skips, pairs: &[LeafPair]) -> Vec<f64> {
-    let blocked: Vec<&LeafPair> = pairs.iter().filter(|pair| !pair.blockers.is_empty()).collect();
+    // With nothing between them too, where they are not taken for that.
+    let looked_at = |pair: &&LeafPair| !pair.blockers.is_empty() || !skips.has(Skip::EmptyShaft);
+    let blocked: Vec<&LeafPair> = pairs.iter().filter(looked_at).collect();
     let parts: Vec<Sizes<'_>> = blocked
         .par_iter()
         .map_init(Scratch::default, |scratch, pair| {

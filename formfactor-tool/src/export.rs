@@ -90,7 +90,12 @@ impl<'a> Factors<'a> {
         Ok(Self {
             views: matrix.views()?,
             keys: &grouping.key_of_element,
-            areas: grouping.sums(|i| element_areas[i]),
+            areas: grouping
+                .sums(|i| element_areas[i])
+                .iter()
+                .zip(&grouping.hidden_areas)
+                .map(|(area, hidden)| area + hidden)
+                .collect(),
             count,
             band: (BAND_ENTRIES / count.max(1)).max(1),
         })

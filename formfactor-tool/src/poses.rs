@@ -9,6 +9,7 @@ use geometry::patch::Patch;
 use geometry::unoccluded::{Rule, exchange_in_front};
 use glam::DVec3;
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Steps per unit of a pose: 2^42. The roundings of coordinates in a scene up to a hundred times the patch stay below half
@@ -28,13 +29,15 @@ pub struct Poses {
     parts: Vec<Mutex<HashMap<Pose, (Exchange, Rule)>>>,
     relative: f64,
     is_kept: bool,
+    /// Pairs that asked for a pose's factor.
+    asked: AtomicUsize,
 }
 
 impl Poses {
     /// For factors within `relative`; kept for the next equal pose where `is_kept`.
     pub fn new(relative: f64, is_kept: bool) -> Self {
         let parts = (0..PARTS).map(|_| Mutex::new(HashMap::new())).collect();
-        Self { parts, relative, is_kept }
+        Self { parts, relative, is_kept, asked: AtomicUsize::new(0) }
     }
 
     /// Exchange factor of two patches, each wholly in front of the other; `None` where the pair has no pose that keeps its
@@ -42,6 +45,7 @@ impl Poses {
     pub fn exchange(&self, p: &Patch, q: &Patch) -> Option<(Exchange, Rule)> {
         let unit = (p.corners[1] - p.corners[0]).length();
         let pose = pose(p, q, unit)?;
+        self.asked.fetch_add(1, Ordering::Relaxed);
         let scaled = |(found, rule): (Exchange, Rule)| {
             let area = unit * unit;
             (Exchange { value: found.value * area, error: found.error * area }, rule)
@@ -68,6 +72,12 @@ impl Poses {
     /// Number of different poses met.
     pub fn distinct(&self) -> usize {
         self.parts.iter().map(|part| part.lock().unwrap_or_else(PoisonError::into_inner).len()).sum()
+    }
+
+    /// Number of pairs whose pose was met before. Two threads may both have computed a pose that neither had met: this counts
+    /// as if one had, so that it does not depend on threads.
+    pub fn spared(&self) -> usize {
+        if self.is_kept { self.asked.load(Ordering::Relaxed).saturating_sub(self.distinct()) } else { 0 }
     }
 }
 

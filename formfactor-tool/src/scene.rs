@@ -8,6 +8,7 @@ use geometry::merge::merged_occluders;
 use geometry::occluder::Occluder;
 use geometry::patch::Patch;
 use geometry::plane::{PLANARITY, Plane};
+use geometry::polygon::mean_corner;
 use geometry::shadow::Set;
 use geometry::unoccluded::HEIGHT_ROUNDING;
 use glam::DVec3;
@@ -29,7 +30,7 @@ pub struct Scene {
     pub bodies: Vec<Body>,
     /// Cluster tree; the root is first.
     pub clusters: Vec<Cluster>,
-    /// Whether the scene is a convex enclosure seen from inside.
+    /// Whether the scene was found to be a convex enclosure seen from inside, where nothing can block.
     pub convex: bool,
 }
 
@@ -66,11 +67,12 @@ impl Scene {
                     .with_context(|| format!("element {} has no area: rebuild the mesh", e.0))
             })
             .collect::<anyhow::Result<Vec<Patch>>>()?;
-        let convex = is_convex_enclosure(&occluders, &patches);
-        if convex && skips.has(Skip::ConvexEnclosure) {
+        let convex = skips.has(Skip::ConvexEnclosure) && is_convex_enclosure(&occluders, &patches);
+        if convex {
             occluders.clear();
         }
-        let bodies = bodies(&occluders);
+        let mut bodies = bodies(&occluders);
+        seal(&mut bodies, mesh);
         let faces = mesh.element_ids().map(|e: ElementId| mesh.element_face(e).0).collect();
         let clusters = cluster_tree(mesh, &patches);
         Ok(Scene { patches, faces, occluders, bodies, clusters, convex })
@@ -84,6 +86,20 @@ impl Scene {
     /// Whether there are no elements.
     pub fn is_empty(&self) -> bool {
         self.patches.is_empty()
+    }
+}
+
+/// Seals the bodies that have no front inside: those without two-sided faces.
+fn seal(bodies: &mut [Body], mesh: &Mesh) {
+    let of_two_sided = |k: &usize| mesh.is_two_sided(mesh.occluder_faces[*k]);
+    let looking_in: Vec<DVec3> = (0..mesh.occluders.len())
+        .filter(of_two_sided)
+        .map(|k| mean_corner(&mesh.occluder_corners(k)))
+        .collect();
+    for body in bodies {
+        if !looking_in.iter().any(|&place| body.has_on_surface(place)) {
+            body.seal();
+        }
     }
 }
 

@@ -20,7 +20,7 @@ pub enum Skip {
     Covered,
     /// Blockers outside a shaft are outside every narrower one
     InheritedBlockers,
-    /// S is symmetric: each pair is computed once
+    /// S is symmetric: each pair is computed once (within a block on the diagonal always)
     Reciprocity,
     /// Zeros are not stored: no blocks of zeros, only the others in blocks that hold mostly zeros
     ZeroBlocks,

@@ -46,6 +46,8 @@ pub struct Settled {
     pub covered: usize,
     /// Tests of a body against a shaft.
     pub shaft_tests: usize,
+    /// Tests left out because the body is outside a wider shaft.
+    pub shaft_tests_spared: usize,
 }
 
 impl Settled {
@@ -55,6 +57,7 @@ impl Settled {
             behind: self.behind + other.behind,
             covered: self.covered + other.covered,
             shaft_tests: self.shaft_tests + other.shaft_tests,
+            shaft_tests_spared: self.shaft_tests_spared + other.shaft_tests_spared,
         }
     }
 }
@@ -94,6 +97,9 @@ impl Walk<'_> {
             return (Vec::new(), settled);
         }
         let mut blockers = inherited.to_vec();
+        if a != b {
+            settled.shaft_tests_spared = self.scene.bodies.len() - inherited.len();
+        }
         if a != b && !inherited.is_empty() {
             settled.shaft_tests = inherited.len();
             match self.between(first, second, inherited) {

@@ -38,6 +38,9 @@ pub struct Body {
     pub radius: f64,
     /// The faces of a solid body as flat ones, for pairs with an end inside it; none for a flat body.
     pub parts: Vec<Body>,
+    /// Whether it is a face of a solid body whose inside nothing looks into: what lies on it lies outside, and where it looks
+    /// at the body it touches it and sees nothing.
+    pub is_skin: bool,
 }
 
 impl Body {
@@ -51,7 +54,21 @@ impl Body {
             centre: occluder.centre,
             radius: occluder.radius,
             parts: Vec::new(),
+            is_skin: false,
         }
+    }
+
+    /// Says that nothing looks into its inside: no face of it has a front there. Two bodies that touch then hide each other's
+    /// faces there, instead of letting them look through each other's inside.
+    pub fn seal(&mut self) {
+        self.parts.iter_mut().for_each(|part| part.is_skin = true);
+    }
+
+    /// Whether a point lies on its surface.
+    pub fn has_on_surface(&self, point: DVec3) -> bool {
+        let tolerance = PLANARITY * self.radius;
+        let highest = self.faces.iter().map(|face| face.distance(point)).fold(f64::NEG_INFINITY, f64::max);
+        highest.abs() <= tolerance
     }
 
     /// Whether it has no inside.
@@ -188,7 +205,7 @@ impl<'a> Surface<'a> {
         }
         // A flat patch with a lid of its own encloses nothing.
         let has_inside = faces.iter().all(|face| corners.iter().any(|&c| face.distance(c) < -tolerance));
-        has_inside.then_some(Body { faces, edges, corners, centre, radius, parts })
+        has_inside.then_some(Body { faces, edges, corners, centre, radius, parts, is_skin: false })
     }
 }
 

@@ -27,4 +27,5 @@ pub mod source_tree;
 pub mod strata;
 pub mod unoccluded;
 pub mod visible;
+pub mod visible_four;
 pub mod visible_part;

@@ -6,6 +6,7 @@ use crate::polygon;
 use crate::quadrature::gauss;
 use crate::shadow::{Blocking, From, Set, Shadows};
 use crate::shadow_planes::{ShadowPlane, WORTHLESS_CUT, shadow_planes};
+use crate::visible_four::{self, LANES, visible_factors};
 use crate::visible_part::{self, visible_factor};
 use glam::DVec3;
 use std::collections::BinaryHeap;
@@ -30,6 +31,11 @@ const SMOOTH_ERROR: f64 = 4.0;
 const VARIATION_ERROR: f64 = 0.01;
 /// Most that the variation alone counts.
 const MOST_VARIATION_ERROR: f64 = 3e-5;
+/// Unless that is less than this share of the distance: 0.26 of it were seen as error where the centre agreed by chance.
+const CHANCE: f64 = 0.3;
+/// The same where the error must hold by itself: over triangles and other cells that are not their own mirror image
+/// terms of third order remain, with up to 0.07 v^3 seen where the centre agreed by chance.
+const ODD_ERROR: f64 = 0.1;
 /// Where shadow lines cross a cell, its points may all miss what lies between them: that much of the unblocked
 /// factor is never ruled out.
 const UNSEEN: f64 = 0.02;
@@ -77,6 +83,8 @@ struct Cell {
     shadows: Range<usize>,
     value: f64,
     error: f64,
+    /// Where the error must hold by itself: the error without the credit that holds on average only.
+    doubt: f64,
     /// Rule applied, as a place in [`ORDERS`].
     order: usize,
     /// Whether shadow planes may still cross it.
@@ -86,6 +94,8 @@ struct Cell {
     /// Whether higher orders do not help: there is a bend or a singularity inside or at the border.
     is_rough: bool,
     area: f64,
+    /// Its part in what has to fall: the larger of its shares in the sums of errors and of squared doubts.
+    urgency: f64,
     /// Order of creation: makes the queue's order unique.
     serial: usize,
 }
@@ -103,7 +113,7 @@ impl PartialOrd for Cell {
 }
 impl Ord for Cell {
     fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.error.total_cmp(&other.error).then(other.serial.cmp(&self.serial))
+        self.urgency.total_cmp(&other.urgency).then(other.serial.cmp(&self.serial))
     }
 }
 
@@ -111,6 +121,7 @@ impl Ord for Cell {
 #[derive(Debug, Default)]
 pub struct Scratch {
     visible: visible_part::Scratch,
+    four: visible_four::Scratch,
     corners: Vec<DVec3>,
     cells: BinaryHeap<Cell>,
     values: Vec<(f64, f64)>,
@@ -129,8 +140,9 @@ struct Integral<'s, 'a> {
     scratch: &'s mut Scratch,
     wanted: Wanted,
     evaluations: usize,
-    /// Sum of the cells' errors, and number of cells made.
+    /// Sum of the cells' errors, sum of their squared doubts, and number of cells made.
     error: f64,
+    doubt: f64,
     made: usize,
     /// Least and largest value seen in the present cell.
     low: f64,
@@ -167,6 +179,7 @@ pub fn exchange(
         wanted,
         evaluations: 0,
         error: 0.0,
+        doubt: 0.0,
         made: 0,
         low: 0.0,
         high: 0.0,
@@ -187,8 +200,10 @@ pub fn exchange(
     let values = &mut scratch.values;
     values.clear();
     values.extend(scratch.cells.iter().map(|c| (c.value, c.error)));
+    let doubt = scratch.cells.iter().map(|c| c.doubt * c.doubt).sum::<f64>().sqrt();
     values.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let (value, error) = values.iter().fold((0.0, 0.0), |(v, e), &(value, error)| (v + value, e + error));
+    let error = doubt.max(error);
     (Exchange { value, error }, Effort { evaluations, exhausted: error > wanted.tolerance })
 }
 
@@ -196,33 +211,42 @@ impl Integral<'_, '_> {
     fn run(&mut self, whole: Cell, planes: &[ShadowPlane]) {
         let demanding = self.wanted.tolerance < UNSEEN * self.wanted.unblocked;
         if demanding && planes.len() <= CUT_AT_ONCE {
-            self.cut_fully(whole, planes);
+            self.cut_fully(whole, planes, planes.len());
         } else {
             self.add(whole);
         }
         loop {
-            if self.error <= self.wanted.tolerance {
-                // The running sum has rounding in it: only a fresh one counts.
+            if self.is_met() {
+                // The running sums have rounding in them: only fresh ones count.
                 self.error = self.scratch.cells.iter().map(|c| c.error).sum();
+                self.doubt = self.scratch.cells.iter().map(|c| c.doubt * c.doubt).sum();
             }
-            if self.error <= self.wanted.tolerance || self.evaluations >= self.wanted.most_evaluations {
+            if self.is_met() || self.evaluations >= self.wanted.most_evaluations {
                 return;
             }
             let Some(cell) = self.scratch.cells.pop() else { return };
             self.error -= cell.error;
+            self.doubt -= cell.doubt * cell.doubt;
             self.improve(cell, planes);
         }
     }
 
-    /// Cuts a cell along every plane that crosses it and integrates over the parts.
-    fn cut_fully(&mut self, cell: Cell, planes: &[ShadowPlane]) {
+    /// Whether both the sum of the errors and, should none of the credits have been earned, what doubts of random sign add up
+    /// to are within the tolerance.
+    fn is_met(&self) -> bool {
+        self.error <= self.wanted.tolerance && self.doubt <= self.wanted.tolerance * self.wanted.tolerance
+    }
+
+    /// Cuts a cell along every plane that crosses it and integrates over the parts. Each plane cuts once on the way to a
+    /// part, so `cuts_left` ends it also where a plane through nearly collinear places is too ill defined to have cut cleanly.
+    fn cut_fully(&mut self, cell: Cell, planes: &[ShadowPlane], cuts_left: usize) {
         match self.best_cut(&cell, planes) {
-            Some(plane) => {
+            Some(plane) if cuts_left > 0 => {
                 for part in self.split(&cell, |p| plane.height(p)).into_iter().flatten() {
-                    self.cut_fully(part, planes);
+                    self.cut_fully(part, planes, cuts_left - 1);
                 }
             }
-            None => self.add(Cell { crossed: false, ..cell }),
+            left => self.add(Cell { crossed: left.is_some(), ..cell }),
         }
     }
 
@@ -260,6 +284,11 @@ impl Integral<'_, '_> {
         let distance = (value - cell.value).abs();
         let decay = if cell.distance > 0.0 { distance / cell.distance } else { 0.0 };
         cell.error = distance * (DECAY_ERROR * decay).clamp(LEAST_DECAY, 1.0);
+        if self.wanted.alone {
+            // Each doubling of the order squares the relative error, should the present distance be small by chance.
+            let size = value.max(cell.value).max(f64::MIN_POSITIVE);
+            cell.doubt = distance.max((cell.distance / size).powi(4) * size);
+        }
         cell.is_rough |= decay > SLOW_DECAY;
         (cell.value, cell.distance) = (value, distance);
         self.keep(cell);
@@ -269,6 +298,8 @@ impl Integral<'_, '_> {
         cell.serial = self.made;
         self.made += 1;
         self.error += cell.error;
+        self.doubt += cell.doubt * cell.doubt;
+        cell.urgency = cell.error.max(cell.doubt * cell.doubt / self.wanted.tolerance.max(f64::MIN_POSITIVE));
         self.scratch.cells.push(cell);
     }
 
@@ -317,30 +348,44 @@ impl Integral<'_, '_> {
         let middle = cell.area * self.at(centre, cell.shadows.clone());
         let distance = (value - middle).abs();
         (cell.value, cell.distance) = (value, distance);
+        let size = value.max(middle).max(f64::MIN_POSITIVE);
+        let variation = (self.high - self.low) * cell.area / size;
+        let odd = ODD_ERROR * variation.powi(3) * size;
         cell.error = if cell.crossed {
             distance.max(UNSEEN * cell.area / self.receiver_area * self.wanted.unblocked)
+        } else if cell.shadows.len() < 2 && self.wanted.alone {
+            distance.max(odd)
         } else if cell.shadows.len() < 2 {
-            let size = value.max(middle).max(f64::MIN_POSITIVE);
-            let variation = (self.high - self.low) * cell.area / size;
-            let varied = (VARIATION_ERROR * variation.powi(4)).min(MOST_VARIATION_ERROR);
-            let smooth = if self.wanted.alone { 1.0 } else { SMOOTH_ERROR * distance / size };
+            let most = MOST_VARIATION_ERROR.max(CHANCE * distance / size);
+            let varied = (VARIATION_ERROR * variation.powi(4)).min(most);
+            let smooth = SMOOTH_ERROR * distance / size;
             (distance * smooth.min(1.0)).max(varied * size)
         } else {
             // Edges of different bodies that seem to cross (EEE) are in no shadow plane: what they let through or take
             // away shows first in the cell's corners.
-            let corners = cell.corners.len() as f64;
-            let outer: f64 = cell.corners.clone().map(|k| self.near_corner(k, centre, &cell)).sum();
-            let tip = (value - cell.area * outer / corners).abs();
+            let outer = self.mean_near_corners(centre, &cell);
+            let tip = (value - cell.area * outer).abs();
             cell.is_rough = tip > BENT * distance;
             (KINK * distance).max(if cell.is_rough { CORNER_ERROR * tip } else { 0.0 })
         };
+        if self.wanted.alone {
+            cell.doubt = cell.error.max(distance).max(odd);
+        }
         self.keep(cell);
     }
 
-    /// What is seen just inside corner `k` of a cell: on a contact line the corner itself has no view of its own.
-    fn near_corner(&mut self, k: usize, centre: DVec3, cell: &Cell) -> f64 {
-        let corner = self.scratch.corners[k];
-        self.at(corner + CORNER_INSET * (centre - corner), cell.shadows.clone())
+    /// Mean of what is seen just inside the corners: on a contact line the corner itself has no view of its own.
+    fn mean_near_corners(&mut self, centre: DVec3, cell: &Cell) -> f64 {
+        let count = cell.corners.len();
+        let inset = |corner: DVec3| corner + CORNER_INSET * (centre - corner);
+        let mut sum = 0.0;
+        for first in (0..count).step_by(LANES) {
+            let number = (count - first).min(LANES);
+            let at = |k: usize| inset(self.scratch.corners[cell.corners.start + first + k.min(number - 1)]);
+            let points = [at(0), at(1), at(2), at(3)];
+            sum += self.at_four(&points, cell)[..number].iter().sum::<f64>();
+        }
+        sum / count as f64
     }
 
     /// The shadow plane that cuts the cell most evenly.
@@ -372,6 +417,21 @@ impl Integral<'_, '_> {
         seen
     }
 
+    /// What four points of a cell see.
+    fn at_four(&mut self, points: &[DVec3; LANES], cell: &Cell) -> [f64; LANES] {
+        let (source, which) = (self.source.corners, (cell.shadows.clone(), self.from));
+        match visible_factors(points, self.normal, source, self.shadows, which, &mut self.scratch.four) {
+            None => points.map(|point| self.at(point, cell.shadows.clone())),
+            Some(seen) => {
+                self.evaluations += LANES;
+                for value in seen {
+                    (self.low, self.high) = (self.low.min(value), self.high.max(value));
+                }
+                seen
+            }
+        }
+    }
+
     /// n x n Gauss points on each quadrilateral of a fan, squeezed into triangles.
     fn integrate(&mut self, cell: &Cell, n: usize) -> f64 {
         let rule = gauss(n);
@@ -383,6 +443,8 @@ impl Integral<'_, '_> {
             let (a, b, c) = (corner(0), corner(k), corner(k + 1));
             // A triangle is a quadrilateral whose first corner is doubled.
             let d = if k + 2 < count { corner(k + 2) } else { a };
+            // Orders are even: the points come in fours.
+            let (mut points, mut weights, mut filled) = ([DVec3::ZERO; LANES], [0.0; LANES], 0);
             for (s, ws) in rule.points.iter().zip(&rule.weights) {
                 let s = 0.5 * (1.0 + s);
                 let (near, far) = (a + s * (b - a), d + s * (c - d));
@@ -390,9 +452,14 @@ impl Integral<'_, '_> {
                 for (t, wt) in rule.points.iter().zip(&rule.weights) {
                     let t = 0.5 * (1.0 + t);
                     let along = along_near + t * (along_far - along_near);
-                    let jacobian = along.cross(far - near).dot(self.normal);
-                    let point = near + t * (far - near);
-                    value += 0.25 * ws * wt * jacobian * self.at(point, cell.shadows.clone());
+                    points[filled] = near + t * (far - near);
+                    weights[filled] = 0.25 * ws * wt * along.cross(far - near).dot(self.normal);
+                    filled += 1;
+                    if filled == LANES {
+                        let seen = self.at_four(&points, cell);
+                        value += (0..LANES).map(|k| weights[k] * seen[k]).sum::<f64>();
+                        filled = 0;
+                    }
                 }
             }
             k += 2;

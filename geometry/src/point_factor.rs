@@ -35,7 +35,7 @@ const MANY_TERMS: f64 = 0.06;
 
 /// atan2(s, d) / s for s = sqrt(`sine_squared`): the angle between two vectors over the length of their cross product.
 /// The angles of edges seen from afar are small: their series needs neither root nor arc tangent.
-fn angle_over_sine(sine_squared: f64, dot: f64) -> f64 {
+pub(crate) fn angle_over_sine(sine_squared: f64, dot: f64) -> f64 {
     let dot_squared = dot * dot;
     if dot > 0.0 && sine_squared < MANY_TERMS * dot_squared {
         let inverse = 1.0 / dot;

@@ -19,7 +19,8 @@ const EDGE_ROUNDING: f64 = 1e-12;
 type Standing = i8;
 
 /// Where a set stands relative to one face of `body`. A set on the face's plane counts as in front where it looks away from
-/// the body, as behind where it looks into it; a flat body's plane has its front on both sides.
+/// the body, as behind where it looks into it; a flat body's plane has its front on both sides, unless it is the skin of a
+/// solid one: then the set lies outside.
 fn stand(set: Set<'_>, face: &Plane, body: &Body) -> Standing {
     let tolerance = PLANARITY * (body.radius + set.radius);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -29,6 +30,13 @@ fn stand(set: Set<'_>, face: &Plane, body: &Body) -> Standing {
         high = if height > high { height } else { high };
     }
     match (low >= -tolerance, high <= tolerance) {
+        (true, true) if body.is_skin => {
+            if face.normal.dot(body.faces[0].normal) > 0.0 {
+                1
+            } else {
+                -1
+            }
+        }
         (true, true) if body.is_flat() => 1,
         (true, true) => set.normal.map_or(0, |n| if n.dot(face.normal) > 0.0 { 1 } else { -1 }),
         // Some of a mixed set may lie on the plane and look either way.
@@ -72,6 +80,22 @@ struct Shadow<'a> {
     edges: [Range<usize>; 2],
     /// Per way round: faces that can be in front and that the source reaches through.
     fronts: [Range<usize>; 2],
+}
+
+/// What bounds a shadow seen from any point of a receiver.
+#[derive(Debug, Clone, Copy)]
+pub enum Border {
+    /// The plane through the point and an edge; `inward` (from - x) x (to - x) points to the hidden side.
+    Edge {
+        /// Start of the edge.
+        from: DVec3,
+        /// End of the edge.
+        to: DVec3,
+        /// 1 or -1.
+        inward: f64,
+    },
+    /// A front face: what lies behind it is hidden.
+    Front(Plane),
 }
 
 /// A half-space of the view from a point: the r (from the point) with normal . r + offset >= 0.
@@ -317,6 +341,33 @@ impl<'a> Shadows<'a> {
             if height > 0.0 {
                 out.push(HalfSpace { normal: -face.normal, offset: -height });
             }
+        }
+        true
+    }
+
+    /// The borders of what shadow `at` hides, where they are the same for all points of the receiver; `false` where they
+    /// are not.
+    pub fn borders(&self, at: usize, from: From, out: &mut Vec<Border>) -> bool {
+        out.clear();
+        let shadow = &self.list[at];
+        let standings = &self.standings[shadow.standings[from as usize].clone()];
+        if shadow.body.is_flat() && standings[0] == 0 {
+            return false;
+        }
+        for &k in &self.edges[shadow.edges[from as usize].clone()] {
+            let edge = &shadow.body.edges[k as usize];
+            let (left, right) = (standings[edge.left], standings[edge.right]);
+            if left * right != -1 {
+                return false;
+            }
+            let inward = if left == 1 { -1.0 } else { 1.0 };
+            out.push(Border::Edge { from: edge.from, to: edge.to, inward });
+        }
+        for &k in &self.fronts[shadow.fronts[from as usize].clone()] {
+            if standings[k as usize] == 0 {
+                return false;
+            }
+            out.push(Border::Front(shadow.body.faces[k as usize]));
         }
         true
     }

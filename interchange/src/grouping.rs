@@ -17,7 +17,7 @@ pub enum By {
 }
 
 /// Elements gathered under keys, each key one row of the export.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Grouping {
     /// Title of the key column.
     pub title: &'static str,
@@ -25,6 +25,8 @@ pub struct Grouping {
     pub labels: Vec<String>,
     /// Key of each element.
     pub key_of_element: Vec<u32>,
+    /// Area under each key that is hidden and has no elements: irradiance and radiosity are 0 there.
+    pub hidden_areas: Vec<f64>,
 }
 
 impl Grouping {
@@ -32,21 +34,31 @@ impl Grouping {
     pub fn new(mesh: &Mesh, by: By) -> Self {
         let numbers = |count: usize| (1..=count).map(|n| n.to_string()).collect();
         let elements = mesh.element_ids();
+        let hidden = |keys: usize, key: &dyn Fn(usize) -> u32| {
+            let mut areas = vec![0.0; keys];
+            for (face, area) in mesh.hidden_areas.iter().enumerate() {
+                areas[key(face) as usize] += area;
+            }
+            areas
+        };
         match by {
             By::Element => Self {
                 title: "element",
                 labels: numbers(mesh.element_count()),
                 key_of_element: elements.map(|e| e.0).collect(),
+                hidden_areas: vec![0.0; mesh.element_count()],
             },
             By::Face => Self {
                 title: "face",
                 labels: numbers(mesh.input_face_count as usize),
-                key_of_element: elements.map(|e| mesh.face_inputs[mesh.element_face(e).index()]).collect(),
+                key_of_element: elements.map(|e| mesh.element_input(e)).collect(),
+                hidden_areas: hidden(mesh.input_face_count as usize, &|face| mesh.face_inputs[face]),
             },
             By::Group => Self {
                 title: "group",
                 labels: mesh.groups.clone(),
                 key_of_element: elements.map(|e| mesh.element_group(e).0).collect(),
+                hidden_areas: hidden(mesh.groups.len(), &|face| mesh.face_groups[face].0),
             },
         }
     }

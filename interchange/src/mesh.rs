@@ -67,13 +67,20 @@ pub struct Mesh {
     pub element_faces: Vec<FaceId>,
     /// 0: the element looks where its face looks; 1: it is the back of a two-sided face.
     pub element_sides: Vec<u32>,
+    /// The scene's face (from 0, in file order) each element belongs to: a region made of several faces gives an element
+    /// to the face that holds its middle. Empty where no faces were merged: see [`Mesh::element_input`].
+    pub element_inputs: Vec<u32>,
     /// Vertex of each node. Nodes are shared by elements that meet along edges without a value discontinuity: those in
     /// one plane that look the same way and have the same material, be they of one face or of several.
     pub node_vertices: Vec<VertexId>,
     /// Corners of each planar face: simple polygons, counter-clockwise seen from the front. They block light.
     pub faces: Ragged<VertexId>,
-    /// The scene's face (from 0, in file order) each planar face is all or part of.
+    /// The scene's face (from 0, in file order) each planar face is all or part of; the first, where coplanar faces were
+    /// merged into one region.
     pub face_inputs: Vec<u32>,
+    /// Area of each face, all sides together, that nothing can shine on (under a block) and that therefore has no
+    /// elements. It counts in means over faces and groups, with irradiance and radiosity 0. Empty where nothing is hidden.
+    pub hidden_areas: Vec<f64>,
     /// Group of each face.
     pub face_groups: Vec<GroupId>,
     /// Material of each face.
@@ -145,6 +152,12 @@ impl Mesh {
         self.element_faces[element.index()]
     }
 
+    /// The scene's face an element belongs to.
+    pub fn element_input(&self, element: ElementId) -> u32 {
+        let of_face = || self.face_inputs[self.element_face(element).index()];
+        self.element_inputs.get(element.index()).copied().unwrap_or_else(of_face)
+    }
+
     /// Material of an element.
     pub fn element_material(&self, element: ElementId) -> MaterialId {
         self.face_materials[self.element_face(element).index()]
@@ -153,6 +166,34 @@ impl Mesh {
     /// Group of an element.
     pub fn element_group(&self, element: ElementId) -> GroupId {
         self.face_groups[self.element_face(element).index()]
+    }
+
+    /// Identity of each element: equal in two meshes of a scene where the element has the same corners in the same
+    /// order, up to rotation, on a face of the same material. With it and [`Mesh::occluder_identity`] equal, so is
+    /// every form factor between two such elements.
+    pub fn element_identities(&self) -> Vec<u64> {
+        let identity = |element: usize| {
+            let bits: Vec<[u64; 3]> = self
+                .elements
+                .row(element)
+                .iter()
+                .map(|v| self.vertices[v.index()].map(f64::to_bits))
+                .collect();
+            let first = (0..bits.len()).min_by_key(|&k| bits[k]).unwrap_or(0);
+            let ring = (0..bits.len()).flat_map(|k| bits[(first + k) % bits.len()]);
+            let material = self.face_materials[self.element_faces[element].index()].0;
+            mixed(ring.chain([u64::from(material)]))
+        };
+        (0..self.element_count()).map(identity).collect()
+    }
+
+    /// Identity of everything that blocks light.
+    pub fn occluder_identity(&self) -> u64 {
+        let corners = self.occluders.rows().flat_map(|row| {
+            let end = [u64::MAX];
+            row.iter().flat_map(|v| self.vertices[v.index()].map(f64::to_bits)).chain(end)
+        });
+        mixed(corners)
     }
 
     /// Whether both sides of the face take part.
@@ -178,7 +219,7 @@ impl Mesh {
             input_faces: self.input_face_count,
         };
         let (groups, materials) = (pack_names(&self.groups), pack_names(&self.materials));
-        Writer::new(Kind::Mesh)
+        let writer = Writer::new(Kind::Mesh)
             .section("vertices", &self.vertices)
             .section("element_starts", self.elements.starts())
             .section("element_corners", self.elements.values())
@@ -199,8 +240,19 @@ impl Mesh {
             .section("lines", &self.lines)
             .section("clusters", &self.clusters)
             .section("groups", &groups)
-            .section("materials", &materials)
-            .write(path, provenance, record)
+            .section("materials", &materials);
+        // What a mesh does not have is not in the file: meshes of faces as given stay as version 1.0 wrote them.
+        let writer = if self.element_inputs.is_empty() {
+            writer
+        } else {
+            writer.section("element_inputs", &self.element_inputs)
+        };
+        let writer = if self.hidden_areas.is_empty() {
+            writer
+        } else {
+            writer.section("hidden_areas", &self.hidden_areas)
+        };
+        writer.write(path, provenance, record)
     }
 
     /// Reads and checks a mesh. The digest is what dependent files must name.
@@ -208,15 +260,17 @@ impl Mesh {
         let file = File::<Record>::open(path, Kind::Mesh)?;
         let n = file.record.clone();
         let (elements, faces, occluders) = (n.elements as usize, n.faces as usize, n.occluders as usize);
-        let mesh = Mesh {
+        let mut mesh = Mesh {
             vertices: file.counted_section::<[f64; 3]>("vertices", n.vertices as usize)?.to_vec(),
             elements: ragged(&file, "element_starts", "element_corners", elements)?,
             element_nodes: ragged(&file, "element_node_starts", "element_nodes", elements)?,
             element_faces: file.counted_section("element_faces", elements)?.to_vec(),
             element_sides: file.counted_section("element_sides", elements)?.to_vec(),
+            element_inputs: Vec::new(),
             node_vertices: file.counted_section("node_vertices", n.nodes as usize)?.to_vec(),
             faces: ragged(&file, "face_starts", "face_corners", faces)?,
             face_inputs: file.counted_section("face_inputs", faces)?.to_vec(),
+            hidden_areas: Vec::new(),
             face_groups: file.counted_section("face_groups", faces)?.to_vec(),
             face_materials: file.counted_section("face_materials", faces)?.to_vec(),
             face_flags: file.counted_section("face_flags", faces)?.to_vec(),
@@ -228,6 +282,13 @@ impl Mesh {
             materials: file.names("materials", n.materials as usize)?,
             input_face_count: n.input_faces,
         };
+        // Sections of version 1.1 that a mesh may have.
+        if file.has("element_inputs") {
+            mesh.element_inputs = file.counted_section("element_inputs", elements)?.to_vec();
+        }
+        if file.has("hidden_areas") {
+            mesh.hidden_areas = file.counted_section("hidden_areas", faces)?.to_vec();
+        }
         mesh.check().map_err(|(part, found)| file.damaged(part, found, "the invariants of FORMAT.md"))?;
         let digest = file.digest();
         Ok((mesh, file.provenance, digest))
@@ -264,6 +325,10 @@ impl Mesh {
             }
         }
         in_range("element_faces", self.element_faces.iter().map(|f| f.0), self.faces.len())?;
+        in_range("element_inputs", self.element_inputs.iter().copied(), self.input_face_count as usize)?;
+        if let Some(i) = self.hidden_areas.iter().position(|&area| !(area.is_finite() && area >= 0.0)) {
+            return Err(("hidden_areas", format!("{} at {i}", self.hidden_areas[i])));
+        }
         in_range("element_sides", self.element_sides.iter().copied(), 2)?;
         in_range("face_groups", self.face_groups.iter().map(|g| g.0), self.groups.len())?;
         in_range("face_materials", self.face_materials.iter().map(|m| m.0), self.materials.len())?;
@@ -298,6 +363,17 @@ impl Mesh {
         }
         Ok(())
     }
+}
+
+/// A hash of words: FNV-1a over whole words, finished as in SplitMix64.
+fn mixed(words: impl Iterator<Item = u64>) -> u64 {
+    let sum = words.fold(0xcbf2_9ce4_8422_2325_u64, |hash, word| {
+        let hash = (hash ^ word).wrapping_mul(0x0000_0100_0000_01b3);
+        hash ^ (hash >> 29)
+    });
+    let sum = (sum ^ (sum >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let sum = (sum ^ (sum >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    sum ^ (sum >> 31)
 }
 
 fn ragged<T: Pod>(file: &File<Record>, starts: &str, values: &str, rows: usize) -> Result<Ragged<T>> {

@@ -1,8 +1,9 @@
 //! The mesh put together from the patches of all layers: vertices, elements in cluster order, nodes, lines.
 
-use crate::clean::Cleaned;
+use crate::clean::{Cleaned, Face, Member};
 use crate::cluster;
 use crate::contact::Pieces;
+use crate::frame::contains;
 use crate::nodes::{self, Element};
 use crate::patch::Patch;
 use crate::sheets::Layer;
@@ -27,6 +28,7 @@ pub fn assemble(
     six_nodes: bool,
 ) -> (Mesh, usize) {
     let Cleaned { mut places, faces } = cleaned;
+    let mut hidden_areas = vec![0.0; faces.len()];
     let diagonal = polygon::diameter(places.positions());
     let centre = polygon::mean_corner(places.positions());
     let (mut elements, mut lines, mut flat) = (Vec::new(), Vec::new(), 0);
@@ -61,10 +63,13 @@ pub fn assemble(
             from: VertexId(vertices[line.from as usize]),
             to: VertexId(vertices[line.to as usize]),
             face: FaceId(layer.sheets[line.sheet as usize].face),
-            order: 0,
+            order: line.order,
             source: FaceId(line.source),
         }));
         lines.retain(|line: &Line| line.from != line.to);
+        for &(sheet, area) in &patch.hidden {
+            hidden_areas[layer.sheets[sheet as usize].face as usize] += area;
+        }
     }
 
     // Number the elements in cluster order.
@@ -89,6 +94,12 @@ pub fn assemble(
     for line in &mut lines {
         (line.from, line.to) = (vertices.one(line.from.0), vertices.one(line.to.0));
     }
+    let inputs = elements.iter().map(|e| input_of(&faces[e.face as usize], e, &vertices, places.positions()));
+    let merged = faces.iter().any(|face| !face.members.is_empty());
+    let element_inputs = if merged { inputs.collect() } else { Vec::new() };
+    if hidden_areas.iter().all(|&area| area == 0.0) {
+        hidden_areas.clear();
+    }
     let middles = six_nodes.then(|| middles(&elements, &mut vertices.positions));
     let nodes = nodes::number(&elements, middles.as_deref());
 
@@ -98,6 +109,8 @@ pub fn assemble(
         element_nodes: nodes.of_elements,
         element_faces: elements.iter().map(|e| FaceId(e.face)).collect(),
         element_sides: elements.iter().map(|e| e.side).collect(),
+        element_inputs,
+        hidden_areas,
         node_vertices: nodes.vertices,
         faces: face_corners,
         face_inputs: faces.iter().map(|face| face.input).collect(),
@@ -119,6 +132,22 @@ pub fn assemble(
         input_face_count: scene.faces.len() as u32,
     };
     (mesh, flat)
+}
+
+/// The scene's face that an element belongs to: of a region the first face that holds its middle.
+fn input_of(face: &Face, element: &Element, vertices: &Vertices, places: &[DVec3]) -> u32 {
+    if face.members.is_empty() {
+        return face.input;
+    }
+    let corners: Vec<DVec3> = element.corners.iter().map(|&v| vertices.positions[v as usize]).collect();
+    let centre = polygon::mean_corner(&corners);
+    let (x, y) = face.plane.axes();
+    let flat = |p: DVec3| glam::DVec2::new((p - centre).dot(x), (p - centre).dot(y));
+    let holds = |member: &&Member| {
+        let ring: Vec<glam::DVec2> = member.corners.iter().map(|&p| flat(places[p as usize])).collect();
+        contains(&ring, glam::DVec2::ZERO)
+    };
+    face.members.iter().find(holds).map_or(face.input, |member| member.input)
 }
 
 /// Vertices of the mesh, numbered when first used.

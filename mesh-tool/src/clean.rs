@@ -3,9 +3,12 @@
 //! Equal corners become one place; repeated corners, faces without area and faces given twice are dropped; polygons
 //! whose corners lie off their plane are cut into triangles. Everything dropped or cut is counted.
 
+use crate::duplicates::without_duplicates;
 use crate::frame::{Frame, crossing_edges};
+use crate::orient::orient;
 use crate::places::{Places, weld_tolerance};
 use crate::planar::{Border, PlanarGraph};
+use crate::steps::{Off, Step};
 use crate::triangulation::Trouble;
 use geometry::plane::{PLANARITY, Plane};
 use geometry::polygon;
@@ -14,7 +17,15 @@ use interchange::ids::{GroupId, MaterialId};
 use interchange::report::Report;
 use interchange::scene::{Scene, SceneFace};
 use interchange::{Error, Result};
-use std::collections::HashMap;
+
+/// A face of the scene that a region was made of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Member {
+    /// The scene's face.
+    pub input: u32,
+    /// Places of its corners.
+    pub corners: Vec<u32>,
+}
 
 /// A planar polygon of the scene.
 #[derive(Debug, Clone)]
@@ -23,8 +34,10 @@ pub struct Face {
     pub corners: Vec<u32>,
     /// Its plane, normal to the front.
     pub plane: Plane,
-    /// The scene's face it is all or part of.
+    /// The scene's face it is all or part of; of a region the first.
     pub input: u32,
+    /// What a region was made of; empty for a face that is itself.
+    pub members: Vec<Member>,
     /// Group.
     pub group: GroupId,
     /// Material.
@@ -38,7 +51,7 @@ pub struct Face {
 }
 
 /// A cleaned scene.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Cleaned {
     /// Places of all corners.
     pub places: Places,
@@ -46,15 +59,17 @@ pub struct Cleaned {
     pub faces: Vec<Face>,
 }
 
-/// Cleans `scene`; what was dropped or cut goes into `report`.
-pub fn clean(scene: &Scene, report: &mut Report) -> Result<Cleaned> {
+/// Cleans `scene`, but for the steps that `off` names; every repair goes into `report`.
+pub fn clean(scene: &Scene, off: &Off<Step>, report: &mut Report) -> Result<Cleaned> {
     let vertices: Vec<DVec3> = scene.vertices.iter().copied().map(DVec3::from_array).collect();
     let tolerance = weld_tolerance(&vertices);
     if scene.faces.is_empty() || tolerance <= 0.0 {
         return Err(Error::whole(&scene.path, "no face with area; a scene needs at least one"));
     }
     let mut places = Places::new(vertices.first().copied().unwrap_or_default(), tolerance);
-    let welded: Vec<u32> = vertices.iter().map(|&vertex| places.insert(vertex)).collect();
+    let weld = off.leaves(Step::Weld);
+    let place = |&vertex: &DVec3| if weld { places.insert(vertex) } else { places.append(vertex) };
+    let welded: Vec<u32> = vertices.iter().map(place).collect();
     report.count("input faces", scene.faces.len());
     report.count("welded vertices", vertices.len() - places.positions().len());
 
@@ -64,6 +79,11 @@ pub fn clean(scene: &Scene, report: &mut Report) -> Result<Cleaned> {
         let corners = without_repeats(given.corners.iter().map(|&corner| welded[corner as usize]).collect());
         let positions = places.corners(&corners);
         let Some(plane) = plane_of(&positions, tolerance) else {
+            if !off.leaves(Step::ZeroArea) {
+                let found =
+                    "a face without area, which --no-clean zero-area keeps from being dropped; remove it";
+                return Err(Error::scene(&scene.path, given.line, found));
+            }
             without_area += 1;
             continue;
         };
@@ -78,6 +98,7 @@ pub fn clean(scene: &Scene, report: &mut Report) -> Result<Cleaned> {
             corners,
             plane,
             input: input as u32,
+            members: Vec::new(),
             group: given.group,
             material: given.material,
             emits: material.emits(),
@@ -98,11 +119,15 @@ pub fn clean(scene: &Scene, report: &mut Report) -> Result<Cleaned> {
             }
         }
     }
-    let (faces, dropped) = without_duplicates(faces, scene, report);
+    let (mut faces, dropped) =
+        if off.leaves(Step::Duplicates) { without_duplicates(faces, scene, report) } else { (faces, 0) };
+    let oriented = if off.leaves(Step::Orient) { orient(&mut faces, &places) } else { Default::default() };
 
     report.count("dropped zero area", without_area);
     report.count("dropped duplicates", dropped);
     report.count("non-planar faces cut", cut);
+    report.count("turned over", oriented.flipped.len());
+    report.count("patches without orientation", oriented.one_sided.len());
     report.count("faces", faces.len());
     report.estimate("largest plane deviation", largest_deviation);
     if without_area > 0 {
@@ -112,6 +137,25 @@ pub fn clean(scene: &Scene, report: &mut Report) -> Result<Cleaned> {
         report.warn(format!(
             "{}: {cut} faces that are not planar were cut into triangles (largest deviation {largest_deviation:.1e} of their side)",
             scene.path.display()
+        ));
+    }
+    let lines = |which: &[usize]| {
+        let lines: Vec<String> = which.iter().map(|&face| faces[face].line.to_string()).collect();
+        lines.join(", ")
+    };
+    if !oriented.flipped.is_empty() {
+        report.warn(format!(
+            "{}: {} faces contradicted their neighbours and were turned over, on lines {} (--no-clean orient keeps them)",
+            scene.path.display(),
+            oriented.flipped.len(),
+            lines(&oriented.flipped)
+        ));
+    }
+    if !oriented.one_sided.is_empty() {
+        report.warn(format!(
+            "{}: the faces connected to those on lines {} have no consistent orientation and were left as they are",
+            scene.path.display(),
+            lines(&oriented.one_sided)
         ));
     }
     if faces.is_empty() {
@@ -196,44 +240,4 @@ fn triangles(
         .collect();
     // A point without a place would be one that the split made: the polygon touches itself.
     triangles.ok_or_else(|| Trouble::Crowded.at(scene, given.line))
-}
-
-/// Drops faces with the corners and orientation of an earlier one; an emitter wins over what does not emit.
-fn without_duplicates(faces: Vec<Face>, scene: &Scene, report: &mut Report) -> (Vec<Face>, usize) {
-    let mut first: HashMap<Vec<u32>, usize> = HashMap::new();
-    let mut kept = vec![true; faces.len()];
-    for (index, face) in faces.iter().enumerate() {
-        let Some(&earlier) = first.get(&smallest_rotation(&face.corners)) else {
-            first.insert(smallest_rotation(&face.corners), index);
-            continue;
-        };
-        let (winner, loser) =
-            if face.emits && !faces[earlier].emits { (index, earlier) } else { (earlier, index) };
-        kept[loser] = false;
-        first.insert(smallest_rotation(&face.corners), winner);
-        if faces[loser].emits {
-            report.warn(format!(
-                "{}:{}: this emitter repeats the one on line {} and was dropped",
-                scene.path.display(),
-                faces[loser].line,
-                faces[winner].line
-            ));
-        }
-    }
-    let dropped = kept.iter().filter(|kept| !**kept).count();
-    if dropped > 0 {
-        report.warn(format!(
-            "{}: {dropped} faces with the corners and orientation of another were dropped",
-            scene.path.display()
-        ));
-    }
-    (faces.into_iter().zip(kept).filter(|(_, kept)| *kept).map(|(face, _)| face).collect(), dropped)
-}
-
-/// The rotation of a ring that compares smallest: equal for equal rings of one orientation.
-fn smallest_rotation(ring: &[u32]) -> Vec<u32> {
-    let rotation = |start: usize| ring[start..].iter().chain(&ring[..start]).copied().collect::<Vec<u32>>();
-    let least = ring.iter().min();
-    let starts = (0..ring.len()).filter(|&start| Some(&ring[start]) == least);
-    starts.map(rotation).min().unwrap_or_default()
 }

@@ -9,17 +9,23 @@ use crate::frame::turn;
 use crate::patch::{Patch, PatchElement};
 use crate::planar::{Border, Contact, PlanarGraph, Point};
 use crate::sheets::Layer;
+use crate::steps::{Off, Step};
 use crate::triangulation::Trouble;
 use glam::DVec2;
 
 /// Elements of a layer.
-pub fn as_given(layer: &Layer, scene: &Cleaned, pieces: &Pieces) -> Result<Patch, (u32, Trouble)> {
+pub fn as_given(
+    layer: &Layer,
+    scene: &Cleaned,
+    pieces: &Pieces,
+    off: &Off<Step>,
+) -> Result<Patch, (u32, Trouble)> {
     let mut patch = Patch::default();
     let outlines: Vec<Vec<Vec<DVec2>>> =
         layer.sheets.iter().map(|sheet| convex_outlines(layer, sheet.face, scene, pieces)).collect();
     let mut crossings: Vec<Vec<(u32, [DVec2; 2])>> = vec![Vec::new(); layer.sheets.len()];
     for line in contact_lines(layer, scene, pieces) {
-        if line.crosses && !line.along_border {
+        if line.crosses && !line.along_border && off.leaves(Step::Cross) {
             crossings[line.sheet as usize].push((line.source, line.ends));
         }
     }
@@ -30,6 +36,11 @@ pub fn as_given(layer: &Layer, scene: &Cleaned, pieces: &Pieces) -> Result<Patch
             .filter(|&other| overlap(&outlines[index], &outlines[other as usize], tolerance))
             .collect();
         patch.overlapping += usize::from(!winners.is_empty());
+        if let Some(&winner) = winners.first()
+            && scene.faces[sheet.face as usize].emits
+        {
+            patch.lost_emitters.push((index as u32, winner));
+        }
         patch.crossing += usize::from(!crossings[index].is_empty());
         if winners.is_empty() && crossings[index].is_empty() {
             whole(layer, index as u32, scene, pieces, &mut patch);
@@ -76,7 +87,7 @@ fn cut(
         for &(source, ends) in crossings {
             let [from, to] =
                 ends.map(|uv| graph.point(Point { uv, position: layer.frame.lift(uv), place: None }));
-            graph.contact(from, to, Contact { sheet: index, source });
+            graph.contact(from, to, Contact { sheet: index, source, order: 0 });
         }
     });
     let (graph, triangulation) = graph.arrange(scene.places.tolerance() / layer.frame.size)?;

@@ -1,6 +1,6 @@
 //! `mesh-tool info`: what is in a mesh or a material table, on a page a person reads in ten seconds, or as JSON.
 
-use crate::build::Quality;
+use crate::build::{Quality, smallest_angle};
 use crate::sheets;
 use geometry::polygon;
 use glam::DVec3;
@@ -69,6 +69,60 @@ fn groups(mesh: &Mesh) -> Vec<Group<'_>> {
     groups
 }
 
+fn lines_by_order(mesh: &Mesh) -> [usize; 3] {
+    [0, 1, 2].map(|order| mesh.lines.iter().filter(|line| line.order == order).count())
+}
+
+/// How many elements have their smallest angle in each range of degrees.
+fn angle_histogram(mesh: &Mesh) -> Vec<(String, usize)> {
+    let angle = |e| smallest_angle(&mesh.element_corners(e)).0.to_degrees();
+    let angles: Vec<f64> = mesh.element_ids().map(angle).collect();
+    let ends = [0.0, 5.0, 15.0, 25.0, 35.0, 45.0, 60.000_001, 180.0];
+    let count = |low: f64, high: f64| angles.iter().filter(|&&a| a >= low && a < high).count();
+    let counts = ends.windows(2).map(|w| (format!("{:.0}-{:.0}", w[0], w[1]), count(w[0], w[1])));
+    counts.filter(|(_, count)| *count > 0).collect()
+}
+
+/// How many elements have their longest edge in each power of two of the extent.
+fn size_histogram(mesh: &Mesh) -> Vec<(String, usize)> {
+    let (low, high) = bounds(mesh);
+    let extent = DVec3::from_array(low).distance(DVec3::from_array(high));
+    let mut counts = std::collections::BTreeMap::new();
+    for element in mesh.element_ids() {
+        let corners = mesh.element_corners(element);
+        let longest = polygon::edges(&corners).map(|(a, b)| a.distance(b)).fold(0.0, f64::max);
+        *counts.entry((longest / extent).log2().floor().max(-40.0) as i32).or_insert(0) += 1;
+    }
+    counts.into_iter().rev().map(|(power, count)| (format!("2^{power}"), count)).collect()
+}
+
+/// What the report beside the mesh says was repaired.
+fn repairs(path: &Path) -> Option<String> {
+    let report = std::fs::read(interchange::report::Report::path_for(path)).ok()?;
+    let report: Value = serde_json::from_slice(&report).ok()?;
+    let counters = report.get("counters")?.as_object()?;
+    let parts: Vec<String> = REPAIRS
+        .iter()
+        .filter_map(|&name| Some((name, counters.get(name)?.as_u64()?)))
+        .filter(|(_, count)| *count > 0)
+        .map(|(name, count)| format!("{name} {count}"))
+        .collect();
+    Some(if parts.is_empty() { "none".into() } else { parts.join(", ") })
+}
+
+/// Counters of the report that count repairs.
+const REPAIRS: [&str; 9] = [
+    "welded vertices",
+    "dropped zero area",
+    "dropped duplicates",
+    "turned over",
+    "non-planar faces cut",
+    "overlapping faces cut",
+    "crossing faces cut",
+    "hidden parts",
+    "faces merged into regions",
+];
+
 fn emitter_count(mesh: &Mesh) -> usize {
     mesh.element_ids().filter(|&e| mesh.face_flags[mesh.element_face(e).index()] & FACE_EMITS != 0).count()
 }
@@ -111,7 +165,11 @@ fn mesh_page(path: &Path, mesh: &Mesh, provenance: &Provenance, digest: Digest) 
         mesh.input_face_count,
         mesh.occluders.len()
     );
-    let _ = writeln!(page, "lines      {} edges on contact lines (D0)", mesh.lines.len());
+    let [value, slope, curvature] = lines_by_order(mesh);
+    let _ = writeln!(
+        page,
+        "lines      {value} edges where light jumps in value (D0), {slope} in slope (D1), {curvature} in curvature (D2)"
+    );
     let _ = writeln!(
         page,
         "clusters   {}, {} leaves",
@@ -129,6 +187,19 @@ fn mesh_page(path: &Path, mesh: &Mesh, provenance: &Provenance, digest: Digest) 
         "shape      longest edge {:.4e}, smallest angle {:.1} deg (median {:.1})",
         quality.longest_edge, quality.smallest_angle_deg, quality.median_smallest_angle_deg
     );
+    let histogram = |title: &str, counts: &[(String, usize)]| {
+        let parts: Vec<String> = counts.iter().map(|(range, count)| format!("{range}: {count}")).collect();
+        format!("{title}{}\n", parts.join(", "))
+    };
+    page += &histogram("angles     smallest, degrees: ", &angle_histogram(mesh));
+    page += &histogram("sizes      longest edge, parts of the extent: ", &size_histogram(mesh));
+    let hidden: f64 = mesh.hidden_areas.iter().sum();
+    if hidden > 0.0 {
+        let _ = writeln!(page, "hidden     {hidden:.6e} of area without elements");
+    }
+    if let Some(repairs) = repairs(path) {
+        let _ = writeln!(page, "repairs    {repairs}");
+    }
     let groups = groups(mesh);
     let width = groups.iter().map(|g| g.name.chars().count()).max().unwrap_or(5).clamp(5, 40);
     let _ = writeln!(page, "\n{:<width$}  faces  elements          area  materials", "group");
@@ -199,6 +270,11 @@ fn mesh_json(mesh: &Mesh, provenance: &Provenance, digest: Digest) -> String {
         "input_faces": mesh.input_face_count,
         "occluders": mesh.occluders.len(),
         "lines": mesh.lines.len(),
+        "lines_by_order": lines_by_order(mesh),
+        "angle_histogram_deg": angle_histogram(mesh),
+        "size_histogram": size_histogram(mesh),
+        "hidden_area": mesh.hidden_areas.iter().sum::<f64>(),
+        "occluder_identity": format!("{:016x}", mesh.occluder_identity()),
         "clusters": mesh.clusters.len(),
         "low": low,
         "high": high,

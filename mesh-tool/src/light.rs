@@ -92,13 +92,16 @@ impl Light {
         })
     }
 
+    /// Direct light at a point on a plane with unit `normal`.
+    pub fn at(&self, point: DVec3, normal: DVec3, scratch: &mut Scratch) -> f64 {
+        let mut sum = 0.0;
+        self.gatherer.factors(point, normal, scratch, &mut |_, factor| sum += factor);
+        sum
+    }
+
     /// Direct light on a triangle.
     pub fn direct(&self, lit: &Lit, scratch: &mut Scratch) -> [f64; POINTS] {
-        points(&lit.corners).map(|point| {
-            let mut sum = 0.0;
-            self.gatherer.factors(point, lit.normal, scratch, &mut |_, factor| sum += factor);
-            sum
-        })
+        points(&lit.corners).map(|point| self.at(point, lit.normal, scratch))
     }
 
     /// Indirect light on those of the triangles that `wanted` accepts, where all send back what `radiosity` says.

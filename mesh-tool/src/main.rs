@@ -6,7 +6,11 @@ use interchange::provenance::Provenance;
 use interchange::report::Report;
 use interchange::scene::Scene;
 use interchange::tool::{self, Common, Finish};
-use mesh_tool::{NAME, Options, VERSION, depfile, info};
+use mesh_tool::adaptive::INTERPOLATION_ERROR;
+use mesh_tool::discontinuity::Order;
+use mesh_tool::solved::Solved;
+use mesh_tool::steps::{Off, Skip, Step};
+use mesh_tool::{NAME, Options, VERSION, depfile, info, picture};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -43,12 +47,20 @@ enum Command {
         /// Mesh to write
         #[arg(short, long, value_name = "FILE")]
         output: PathBuf,
-        /// Mesh with triangles whose edges are no longer than this, in the scene's unit of length
-        #[arg(long, value_name = "L", value_parser = tool::positive)]
-        max_edge: Option<f64>,
-        /// Mesh with about this many triangles, smaller where light changes; with --max-edge too, the finer of the two wins
-        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
-        elements: Option<u32>,
+        #[command(flatten)]
+        size: SizeArgs,
+    },
+    /// Draw the elements of every plane side by side; lines red where light jumps in value, orange in slope, blue in
+    /// curvature
+    Picture {
+        /// Mesh (.mesh)
+        file: PathBuf,
+        /// Picture to write (.svg or .png)
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
+        /// Only the plane with this number
+        #[arg(long, value_name = "N")]
+        plane: Option<usize>,
     },
     /// Say what is in a mesh or a material table
     Info {
@@ -69,6 +81,65 @@ struct SceneArgs {
     two_sided: Vec<String>,
 }
 
+/// What the elements should be.
+#[derive(Debug, Args)]
+struct SizeArgs {
+    /// Mesh with triangles whose edges are no longer than this, in the scene's unit of length
+    #[arg(long, value_name = "L", value_parser = tool::positive)]
+    max_edge: Option<f64>,
+    /// Mesh with about this many triangles, smaller where light changes; with --max-edge too, the finer of the two wins
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    elements: Option<u32>,
+    /// Mesh as fine as this wants: interpolating direct light between the nodes of an element misses it by no more than
+    /// E of the mean light; with --elements, that many elements at most
+    #[arg(long, value_name = "E", value_parser = tool::positive)]
+    tolerance: Option<f64>,
+    /// Refine the mesh that the other flags make where this solution on it, beside its mesh, is worst. Elements that are not divided stay exactly as they are
+    #[arg(long, value_name = "S.sol")]
+    refine_with: Option<PathBuf>,
+    /// With --refine-with: part of the mean irradiance that the solution may miss [default: 0.02]
+    #[arg(long, value_name = "E", value_parser = tool::positive, requires = "refine_with")]
+    refine_tolerance: Option<f64>,
+    /// With --refine-with: also draw the lines of the K faces that send most light without emitting
+    #[arg(long, value_name = "K", default_value_t = 0, requires = "refine_with")]
+    sources: u32,
+    /// Mesh along the lines where direct light jumps in value (d0: contacts), slope (d1) or curvature (d2)
+    /// [default: d1]
+    #[arg(long, value_name = "ORDER", value_enum)]
+    discontinuity: Option<Order>,
+    /// Also draw the curves of three edges (slow where there are many edges)
+    #[arg(long)]
+    eee: bool,
+    /// Three nodes an element, for linear interpolation, in place of six
+    #[arg(long)]
+    linear: bool,
+    /// Leave out a step of cleaning
+    #[arg(long, value_name = "STEP", value_enum, value_delimiter = ',')]
+    no_clean: Vec<Step>,
+    /// Do also what provably does not matter
+    #[arg(long, value_name = "NAME", value_enum, value_delimiter = ',')]
+    no_skip: Vec<Skip>,
+}
+
+impl SizeArgs {
+    fn options(&self) -> interchange::Result<Options> {
+        let refine_with = self.refine_with.as_deref().map(Solved::read).transpose()?;
+        Ok(Options {
+            refine_with,
+            refine_tolerance: self.refine_tolerance,
+            sources: self.sources,
+            max_edge: self.max_edge,
+            elements: self.elements,
+            tolerance: self.tolerance,
+            discontinuity: self.discontinuity,
+            eee: self.eee,
+            linear: self.linear,
+            no_clean: Off::new(self.no_clean.clone()),
+            no_skip: Off::new(self.no_skip.clone()),
+        })
+    }
+}
+
 impl SceneArgs {
     fn read(&self) -> interchange::Result<Scene> {
         Scene::read(&self.scene, &self.two_sided)
@@ -78,10 +149,10 @@ impl SceneArgs {
 fn main() -> ExitCode {
     let line = CommandLine::parse();
     line.common.start();
-    tool::exit_code(NAME, run(&line).map(|()| Finish::Done))
+    tool::exit_code(NAME, run(&line))
 }
 
-fn run(line: &CommandLine) -> anyhow::Result<()> {
+fn run(line: &CommandLine) -> anyhow::Result<Finish> {
     match &line.command {
         Command::Materials { scene, output, depfile } => {
             let scene = scene.read()?;
@@ -94,8 +165,8 @@ fn run(line: &CommandLine) -> anyhow::Result<()> {
                 atomic_write::write_bytes(path, rule.as_bytes())?;
             }
         }
-        Command::Build { scene: args, output, max_edge, elements } => {
-            let options = Options { max_edge: *max_edge, elements: *elements };
+        Command::Build { scene: args, output, size } => {
+            let options = size.options()?;
             let mut report = Report::new(NAME, VERSION);
             report.flags = options.flags();
             report.flags.extend(args.two_sided.iter().map(|name| format!("--two-sided {name}")));
@@ -104,6 +175,10 @@ fn run(line: &CommandLine) -> anyhow::Result<()> {
                 report.warn(warning.clone());
             }
             refuse_overwriting(&scene, output)?;
+            if let Some(solution) = &size.refine_with {
+                let inputs = [solution.clone(), solution.with_extension("mesh")];
+                atomic_write::refuse_input(output, inputs.iter().map(PathBuf::as_path))?;
+            }
             let mesh = mesh_tool::build(&scene, &options, &mut report)?;
             let provenance = mesh_tool::provenance(&scene, &options);
             report.phase("write", || -> interchange::Result<()> {
@@ -112,10 +187,18 @@ fn run(line: &CommandLine) -> anyhow::Result<()> {
                 Ok(())
             })?;
             report.write_beside(output)?;
+            let error = report.estimates.get(INTERPOLATION_ERROR).copied().unwrap_or(0.0);
+            if let Some(asked) = options.tolerance.filter(|&asked| error > asked) {
+                return Ok(Finish::ToleranceMissed(format!(
+                    "interpolating direct light misses it by up to {error:.2e} of the mean where {asked:.2e} was asked \
+                     for (beside an emitter that touches a face no mesh would do); raise --tolerance or --elements"
+                )));
+            }
         }
+        Command::Picture { file, output, plane } => picture::draw(file, output, *plane)?,
         Command::Info { file, json } => tool::print_data(&info::describe(file, *json)?)?,
     }
-    Ok(())
+    Ok(Finish::Done)
 }
 
 /// Writes the table and, beside it, what geometry depends on. `build` and `materials` write the same bytes.

@@ -13,7 +13,7 @@ pub struct PatchElement {
     pub sheet: u32,
 }
 
-/// A piece of a D0 line that is an edge of elements.
+/// A piece of a discontinuity line that is an edge of elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PatchLine {
     /// Sheet it lies on.
@@ -22,7 +22,9 @@ pub struct PatchLine {
     pub from: u32,
     /// Second point.
     pub to: u32,
-    /// Face in contact.
+    /// 0 value, 1 slope, 2 curvature.
+    pub order: u32,
+    /// Face in contact, or the emitter.
     pub source: u32,
 }
 
@@ -33,8 +35,12 @@ pub struct Patch {
     pub points: Vec<Point>,
     /// Elements.
     pub elements: Vec<PatchElement>,
-    /// D0 lines.
+    /// Discontinuity lines.
     pub lines: Vec<PatchLine>,
+    /// Area of each sheet that is hidden and has no elements: sheet and area.
+    pub hidden: Vec<(u32, f64)>,
+    /// Emitters that lost part of their area to another face: sheet and the one that holds it.
+    pub lost_emitters: Vec<(u32, u32)>,
     /// Sheets that lost part of their area to another.
     pub overlapping: usize,
     /// Sheets cut along a line where another face pokes through.

@@ -47,12 +47,15 @@ impl Places {
                 }
             }
         }
-        nearest.1.unwrap_or_else(|| {
-            let place = self.positions.len() as u32;
-            self.positions.push(position);
-            self.cells.entry(self.cell_of(position)).or_default().push(place);
-            place
-        })
+        nearest.1.unwrap_or_else(|| self.append(position))
+    }
+
+    /// A place of its own for a point that may lie on others.
+    pub fn append(&mut self, position: DVec3) -> u32 {
+        let place = self.positions.len() as u32;
+        self.positions.push(position);
+        self.cells.entry(self.cell_of(position)).or_default().push(place);
+        place
     }
 
     /// Position of a place.

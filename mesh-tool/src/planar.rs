@@ -36,13 +36,15 @@ pub struct Border {
     pub forward: bool,
 }
 
-/// An edge is part of a line where another face touches or crosses a sheet.
+/// An edge is part of a discontinuity line on a sheet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Contact {
     /// Sheet, by its number within the layer.
     pub sheet: u32,
-    /// The other face.
+    /// The other face, or the emitter.
     pub source: u32,
+    /// What jumps there: 0 value, 1 slope, 2 curvature.
+    pub order: u32,
 }
 
 /// A straight edge.
@@ -83,11 +85,16 @@ impl PlanarGraph {
     pub fn ring(&mut self, points: &[u32], border: Border) {
         for (k, &from) in points.iter().enumerate() {
             let to = points[(k + 1) % points.len()];
-            self.edges.push(Edge { from, to, borders: vec![border], contacts: Vec::new() });
+            self.border(from, to, border);
         }
     }
 
-    /// Adds a contact line between two points.
+    /// Adds one edge of a border.
+    pub fn border(&mut self, from: u32, to: u32, border: Border) {
+        self.edges.push(Edge { from, to, borders: vec![border], contacts: Vec::new() });
+    }
+
+    /// Adds a discontinuity line between two points.
     pub fn contact(&mut self, from: u32, to: u32, contact: Contact) {
         self.edges.push(Edge { from, to, borders: Vec::new(), contacts: vec![contact] });
     }
@@ -107,14 +114,20 @@ impl PlanarGraph {
             let Edge { from, to, .. } = self.edges[edge];
             let parts = parts(self.points[from as usize].uv.distance(self.points[to as usize].uv));
             let inner: Vec<Point> = (1..parts).map(|k| self.along(edge, k as f64 / parts as f64)).collect();
-            let mut at = edge;
-            for point in inner {
-                let middle = self.point(point);
-                self.edges[at].to = middle;
-                let rest = Edge { from: middle, to, ..self.edges[at].clone() };
-                self.edges.push(rest);
-                at = self.edges.len() - 1;
-            }
+            self.split_at(edge, &inner);
+        }
+    }
+
+    /// Splits an edge at points, which stand in order along it.
+    pub fn split_at(&mut self, edge: usize, points: &[Point]) {
+        let to = self.edges[edge].to;
+        let mut at = edge;
+        for &point in points {
+            let middle = self.point(point);
+            self.edges[at].to = middle;
+            let rest = Edge { from: middle, to, ..self.edges[at].clone() };
+            self.edges.push(rest);
+            at = self.edges.len() - 1;
         }
     }
 
@@ -143,6 +156,7 @@ impl PlanarGraph {
         for _ in 0..SPLIT_ROUNDS {
             let splits = self.find_splits(&mut places, tolerance);
             if splits.iter().all(Vec::is_empty) {
+                self.edges.retain(|edge| !edge.borders.is_empty() || !edge.contacts.is_empty());
                 return Ok(());
             }
             let mut parts = Vec::new();
@@ -273,7 +287,14 @@ fn merged(edges: Vec<Edge>) -> Vec<Edge> {
         };
         let first = &mut kept[first];
         let same_way = first.from == edge.from;
-        first.borders.extend(edge.borders.iter().map(|b| Border { forward: b.forward == same_way, ..*b }));
+        for border in edge.borders.iter().map(|b| Border { forward: b.forward == same_way, ..*b }) {
+            // There and back: a seam between parts of one sheet.
+            let back = Border { forward: !border.forward, ..border };
+            match first.borders.iter().position(|b| *b == back) {
+                Some(seam) => drop(first.borders.remove(seam)),
+                None => first.borders.push(border),
+            }
+        }
         for contact in edge.contacts {
             if !first.contacts.contains(&contact) {
                 first.contacts.push(contact);
@@ -295,7 +316,7 @@ mod tests {
         };
         for (k, &(a, b, c, d)) in segments.iter().enumerate() {
             let (from, to) = (point(a, b, &mut graph), point(c, d, &mut graph));
-            graph.contact(from, to, Contact { sheet: 0, source: k as u32 });
+            graph.contact(from, to, Contact { sheet: 0, source: k as u32, order: 0 });
         }
         graph
     }

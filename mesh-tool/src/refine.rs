@@ -6,17 +6,18 @@
 //! and points are added in batches between which the free points are smoothed, which gives rounder triangles for
 //! the same count.
 
-use crate::frame::turn;
-use crate::planar::PlanarGraph;
-use crate::triangulation::{Triangle, Triangulation, Trouble};
-use glam::DVec2;
-use std::collections::BTreeSet;
+use crate::conform::EdgeSplit;
+use crate::frame::{Frame, turn};
+use crate::planar::{Contact, PlanarGraph, Point};
+use crate::triangulation::{Triangle, Triangulation, Trouble, grid_place};
+use glam::{DVec2, DVec3};
+use std::collections::{BTreeSet, HashSet};
 
 /// Triangles with a smaller angle are refined, in degrees. Ruppert's bound for termination is 20.7; the floor on the
 /// edge length ends the rest.
-const SMALLEST_ANGLE: f64 = 24.0;
-/// No edge is halved, and no point put closer to another, below this part of the spacing.
-const FLOOR: f64 = 0.15;
+const SMALLEST_ANGLE: f64 = 25.0;
+/// The longest edges of neighbours differ by no more than this factor, above the floor.
+const GRADING: f64 = 2.0;
 /// Of a triangle to be made smaller all edges at least this part of the longest are halved: a strip stays one wide.
 const LONG: f64 = 0.6;
 /// Rounds of adding points; each settles most of what the one before left.
@@ -33,6 +34,8 @@ pub struct Target {
     pub spacing: f64,
     /// No edge may be longer, in units of the frame.
     pub max_edge: f64,
+    /// No edge is halved, and no point put closer to another, below this part of the spacing.
+    pub floor: f64,
 }
 
 /// A graph with points that may move.
@@ -84,15 +87,7 @@ impl Refinement {
             self.smooth(&triangulation, 0);
             triangulation = self.graph.triangulate()?;
         }
-        for _ in 0..LENGTH_ROUNDS {
-            let changes = self.halvings(&triangulation);
-            if changes.is_empty() {
-                break;
-            }
-            self.apply(&changes);
-            triangulation = self.graph.triangulate()?;
-        }
-        Ok(triangulation)
+        self.shorten(triangulation)
     }
 
     /// Halves the long edges of the `marked` triangles, in units of the frame down to `shortest`, and widens the small
@@ -120,6 +115,59 @@ impl Refinement {
         }
         let first_new = self.graph.points.len();
         self.apply(&changes);
+        self.widen(first_new).map(Some)
+    }
+
+    /// Splits edges at points, which stand in order along them; with `widen`, widens the small angles this makes.
+    pub fn split_edges(
+        &mut self,
+        splits: &[EdgeSplit],
+        frame: &Frame,
+        widen: bool,
+    ) -> Result<Triangulation, Trouble> {
+        let first_new = self.graph.points.len();
+        // Two edges closer together than the triangulation can tell must not get a point at the same place.
+        let mut taken: HashSet<[u64; 2]> =
+            self.graph.points.iter().map(|point| grid_place(point.uv)).collect();
+        for (edge, points) in splits {
+            let ends = [self.graph.edges[*edge].from, self.graph.edges[*edge].to];
+            let size = ends.iter().map(|&p| self.sizes[p as usize]).fold(0.0, f64::max);
+            let points: Vec<Point> = points
+                .iter()
+                .map(|&(_, position)| Point { uv: frame.flatten(position), position, place: None })
+                .filter(|point| taken.insert(grid_place(point.uv)))
+                .collect();
+            self.free.extend(points.iter().map(|_| false));
+            self.sizes.extend(points.iter().map(|_| size));
+            self.graph.split_at(*edge, &points);
+        }
+        if widen { self.widen(first_new) } else { self.graph.triangulate() }
+    }
+
+    /// Adds a line that may cross others; to be followed by [`Refinement::rearrange`].
+    pub fn add_line(&mut self, ends: [DVec3; 2], contact: Contact, frame: &Frame) {
+        let [from, to] = ends
+            .map(|position| self.graph.point(Point { uv: frame.flatten(position), position, place: None }));
+        self.graph.contact(from, to, contact);
+    }
+
+    /// Splits edges where they cross after lines were added; points keep their numbers.
+    pub fn rearrange(&mut self, tolerance: f64) -> Result<Triangulation, Trouble> {
+        let before = self.free.len();
+        self.graph = self.graph.clone().arrange(tolerance)?.0;
+        self.free.resize(self.graph.points.len(), false);
+        let spacing = self.target.spacing;
+        self.sizes.resize(self.graph.points.len(), spacing);
+        for edge in &self.graph.edges {
+            for point in [edge.from, edge.to] {
+                self.free[point as usize] = false;
+            }
+        }
+        self.widen(before)
+    }
+
+    /// Widens small angles, moving only points from number `first_new` on.
+    fn widen(&mut self, first_new: usize) -> Result<Triangulation, Trouble> {
         let mut triangulation = self.graph.triangulate()?;
         for _ in 0..ROUNDS {
             self.smooth(&triangulation, first_new);
@@ -131,7 +179,20 @@ impl Refinement {
             self.apply(&changes);
             triangulation = self.graph.triangulate()?;
         }
-        Ok(Some(triangulation))
+        self.shorten(triangulation)
+    }
+
+    /// Halves edges until none is longer than it may be.
+    fn shorten(&mut self, mut triangulation: Triangulation) -> Result<Triangulation, Trouble> {
+        for _ in 0..LENGTH_ROUNDS {
+            let changes = self.halvings(&triangulation);
+            if changes.is_empty() {
+                break;
+            }
+            self.apply(&changes);
+            triangulation = self.graph.triangulate()?;
+        }
+        Ok(triangulation)
     }
 
     fn uv(&self, point: u32) -> DVec2 {
@@ -180,18 +241,24 @@ impl Refinement {
     fn wished_changes(&self, triangulation: &Triangulation) -> Vec<(Change, f64)> {
         let mut wishes = Vec::new();
         for (t, triangle) in triangulation.triangles.iter().enumerate() {
-            if triangulation.sheets(t).next().is_none() {
+            if !triangulation.is_lit(t) {
                 continue;
             }
             let shape = self.shape(triangle);
             let size = triangle.corners.iter().map(|&p| self.sizes[p as usize]).fold(0.0, f64::max);
-            let floor = FLOOR * size;
+            let floor = self.target.floor * size;
             // A strip thinner than this would need edges below the floor; halving its sides would be in vain.
             let in_strip = shape.height < floor * SMALLEST_ANGLE.to_radians().sin()
                 && triangle.corners.iter().all(|&corner| !self.free[corner as usize]);
             if shape.longest > self.target.max_edge {
                 let change = self.middle(triangle, shape.longest_edge);
                 wishes.push((0.0, (change, size), 0.5 * shape.longest));
+            } else if shape.longest > GRADING * self.smallest_neighbour(triangulation, triangle)
+                && shape.longest >= 2.0 * floor
+                && !in_strip
+            {
+                let change = self.middle(triangle, shape.longest_edge);
+                wishes.push((SMALLEST_ANGLE.to_radians(), (change, size), 0.5 * shape.longest));
             } else if shape.smallest_angle < SMALLEST_ANGLE.to_radians()
                 && !shape.given_angle
                 && !in_strip
@@ -217,6 +284,15 @@ impl Refinement {
             }
         }
         changes
+    }
+
+    /// The least longest edge of the neighbours of a triangle.
+    fn smallest_neighbour(&self, triangulation: &Triangulation, triangle: &Triangle) -> f64 {
+        let beside = triangle.neighbours.into_iter().flatten().map(|n| n as usize);
+        beside
+            .filter(|&n| triangulation.is_lit(n))
+            .map(|n| self.shape(&triangulation.triangles[n]).longest)
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// The point that improves a triangle with a small angle, and its distance from the points around it.
@@ -262,7 +338,7 @@ impl Refinement {
     /// Points in the middle of edges that are too long; only of edges that are the longest of each triangle beside
     /// them, so that no triangle is split twice in one round and the longest of all is always among them.
     fn halvings(&self, triangulation: &Triangulation) -> Vec<(Change, f64)> {
-        let inside = |t: u32| triangulation.sheets(t as usize).next().is_some();
+        let inside = |t: u32| triangulation.is_lit(t as usize);
         let mut changes = Vec::new();
         for (t, triangle) in triangulation.triangles.iter().enumerate().filter(|(t, _)| inside(*t as u32)) {
             let shape = self.shape(triangle);
@@ -353,7 +429,7 @@ struct Shape {
 
 /// Adds a free point; its position in space is set when it has stopped moving.
 fn add_free(graph: &mut PlanarGraph, uv: DVec2) {
-    graph.point(crate::planar::Point { uv, position: glam::DVec3::ZERO, place: None });
+    graph.point(Point { uv, position: DVec3::ZERO, place: None });
 }
 
 fn circumcentre(a: DVec2, b: DVec2, c: DVec2) -> Option<DVec2> {

@@ -12,9 +12,9 @@ use std::collections::HashMap;
 /// spacing inside the wall: they stay.
 const CLEARANCE: f64 = 0.45;
 
-/// Points of a lattice with this spacing inside the polygons `rings` and clear of the edges of `graph`, which are
-/// no longer than about the spacing.
-pub fn lattice(graph: &PlanarGraph, rings: &[Vec<DVec2>], spacing: f64) -> Vec<DVec2> {
+/// Points of a lattice with this spacing inside the polygons `rings`, outside the `holes` and clear of the edges of
+/// `graph`, which are no longer than about the spacing.
+pub fn lattice(graph: &PlanarGraph, rings: &[Vec<DVec2>], holes: &[Vec<DVec2>], spacing: f64) -> Vec<DVec2> {
     let edges = EdgeGrid::new(graph, spacing);
     let low = rings.iter().flatten().copied().fold(DVec2::INFINITY, DVec2::min);
     let high = rings.iter().flatten().copied().fold(DVec2::NEG_INFINITY, DVec2::max);
@@ -36,7 +36,8 @@ pub fn lattice(graph: &PlanarGraph, rings: &[Vec<DVec2>], spacing: f64) -> Vec<D
             let point = low + step * DVec2::new(column as f64 + shift, row as f64);
             let in_box = |(low, high): &(DVec2, DVec2)| low.cmple(point).all() && point.cmple(*high).all();
             let inside = rings.iter().zip(&boxes).any(|(ring, b)| in_box(b) && contains(ring, point));
-            if inside && edges.distance(point) >= CLEARANCE * spacing {
+            let clear = || edges.distance(point) >= CLEARANCE * spacing;
+            if inside && clear() && !holes.iter().any(|hole| contains(hole, point)) {
                 points.push(point);
             }
         }

@@ -47,12 +47,17 @@ impl Layer {
     }
 }
 
-/// The layers of a scene, in the order of their first faces.
-pub fn layers(scene: &Cleaned) -> Vec<Layer> {
+/// The layers of a scene, in the order of their first faces; unless `together`, every face is in layers of its own.
+pub fn layers(scene: &Cleaned, together: bool) -> Vec<Layer> {
     let Cleaned { places, faces } = scene;
     let corners: Vec<Vec<DVec3>> = faces.iter().map(|face| places.corners(&face.corners)).collect();
     let mut layers = Vec::new();
-    for plane in coplanar_groups(faces, &corners, places.tolerance()) {
+    let planes = if together {
+        coplanar_groups(faces, &corners, places.tolerance())
+    } else {
+        (0..faces.len()).map(|face| vec![face]).collect()
+    };
+    for plane in planes {
         // The largest face fixes the plane best; the first of (nearly) equal ones, so that rounding does not choose.
         let mut largest = plane[0];
         for &face in &plane {

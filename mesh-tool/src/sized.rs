@@ -1,10 +1,12 @@
 //! How many elements, and of which size: what `--max-edge` and `--elements` ask for.
 
+use crate::adaptive;
 use crate::build::Options;
+use crate::conform;
 use crate::light::Light;
 use crate::lit;
 use crate::meshed::{Drawing, Triangles};
-use crate::patch::Patch;
+use crate::steps::Step;
 use crate::triangulation::Trouble;
 use interchange::report::Report;
 use interchange::scene::Scene;
@@ -12,7 +14,7 @@ use interchange::{Error, Result};
 use rayon::prelude::*;
 
 /// Area of an equilateral triangle of edge 1.
-const EQUILATERAL: f64 = 0.433_012_701_892_219_3;
+pub const EQUILATERAL: f64 = 0.433_012_701_892_219_3;
 /// Spacing wished where no edge may be longer than 1: smoothed lattices stretch single edges by about a fifth.
 const SPACING_PER_MAX_EDGE: f64 = 0.8;
 /// The search for the spacing that gives the asked number of elements ends within this part of it, ...
@@ -24,6 +26,14 @@ const REFINED_TOLERANCE: f64 = 0.1;
 /// More elements than this are refused: their matrix could not be stored.
 const MOST_ELEMENTS: f64 = 20e6;
 
+/// No edge is halved for the sake of shape below this part of the spacing, where the number of elements is given, ...
+const FLOOR: f64 = 0.05;
+/// ... and where only a length is.
+const FINE_FLOOR: f64 = 1e-3;
+
+/// Adaptive meshes start with about this many elements.
+const COARSE: f64 = 80.0;
+
 /// This part of the elements makes a uniform mesh; the others go where light changes.
 const UNIFORM: f64 = 0.35;
 
@@ -33,16 +43,29 @@ pub fn sized(
     drawings: &[Drawing],
     light: Option<&Light>,
     options: &Options,
+    tolerance: f64,
     report: &mut Report,
     name: &(impl Fn(u32, Trouble) -> Error + Sync),
-) -> Result<Vec<Patch>> {
+) -> Result<Vec<Triangles>> {
     let max_edge = options.max_edge.unwrap_or(f64::INFINITY);
-    let search = Search { scene, drawings, max_edge, name };
-    let patches = |meshes: &[Triangles]| -> Vec<Patch> {
-        drawings.par_iter().zip(meshes).map(|(drawing, mesh)| drawing.patch(mesh)).collect()
-    };
+    // A number of elements is a budget: shape yields to it. A length alone is none.
+    let floor = if options.elements.is_some() { FLOOR } else { FINE_FLOOR };
+    let meets = options.no_clean.leaves(Step::Meet).then_some(tolerance);
+    let search = Search { scene, drawings, max_edge, floor, meets, name };
+    if let (Some(light), Some(asked)) = (light, options.tolerance) {
+        let most = options.elements.map_or(MOST_ELEMENTS, f64::from);
+        // Start coarse: what is evenly lit stays so.
+        let coarse = (search.area() / (EQUILATERAL * COARSE)).sqrt().min(SPACING_PER_MAX_EDGE * max_edge);
+        let mut meshes = search.mesh(coarse)?.0;
+        let diagonal = search.diagonal();
+        let wish = adaptive::Wish { tolerance: asked, most, linear: options.linear, diagonal };
+        adaptive::refine(light, drawings, &mut meshes, wish, report)
+            .map_err(|(layer, trouble)| name(drawings[layer].layer().sheets[0].face, trouble))?;
+        report.count("planes that do not meet others everywhere", search.meet(&mut meshes));
+        return Ok(meshes);
+    }
     let Some(wanted) = options.elements.map(f64::from) else {
-        return Ok(patches(&search.mesh(SPACING_PER_MAX_EDGE * max_edge)?.0));
+        return Ok(search.mesh(SPACING_PER_MAX_EDGE * max_edge)?.0);
     };
     if let Some(light) = light {
         let spacing = (search.area() / (EQUILATERAL * wanted)).sqrt();
@@ -50,10 +73,11 @@ pub fn sized(
         if (count(&meshes) as f64) < (1.0 - COUNT_TOLERANCE) * wanted {
             lit::refine(light, drawings, &mut meshes, wanted, spacing, report)
                 .map_err(|(layer, trouble)| name(drawings[layer].layer().sheets[0].face, trouble))?;
+            report.count("planes that do not meet others everywhere", search.meet(&mut meshes));
             let found = count(&meshes) as f64;
             // Where light changes nowhere, only a uniform mesh can use up the rest.
             if (found / wanted - 1.0).abs() <= REFINED_TOLERANCE {
-                return Ok(patches(&meshes));
+                return Ok(meshes);
             }
         }
     }
@@ -64,7 +88,7 @@ pub fn sized(
             "the faces and lines need at least about {found} elements, more than the {wanted} asked for"
         ));
     }
-    Ok(patches(&meshes))
+    Ok(meshes)
 }
 
 fn count(meshes: &[Triangles]) -> usize {
@@ -76,6 +100,9 @@ struct Search<'a, Name> {
     scene: &'a Scene,
     drawings: &'a [Drawing],
     max_edge: f64,
+    floor: f64,
+    /// Points of different planes closer than this are one, where planes are to meet.
+    meets: Option<f64>,
     name: &'a Name,
 }
 
@@ -91,16 +118,26 @@ impl<Name: Fn(u32, Trouble) -> Error + Sync> Search<'_, Name> {
                 ),
             ));
         }
-        let meshes: Vec<Triangles> = self
+        let mut meshes: Vec<Triangles> = self
             .drawings
             .par_iter()
             .map(|drawing| {
-                let mesh = drawing.mesh(spacing, self.max_edge);
+                let mesh = drawing.mesh(spacing, self.max_edge, self.floor);
                 mesh.map_err(|trouble| (self.name)(drawing.layer().sheets[0].face, trouble))
             })
             .collect::<Result<_>>()?;
+        self.meet(&mut meshes);
         let count = count(&meshes) as f64;
         Ok((meshes, count))
+    }
+
+    /// Makes planes meet; returns how many could not.
+    fn meet(&self, meshes: &mut [Triangles]) -> usize {
+        self.meets.map_or(0, |tolerance| conform::meet(self.drawings, meshes, tolerance))
+    }
+
+    fn diagonal(&self) -> f64 {
+        self.drawings.iter().map(|drawing| drawing.layer().frame.size).fold(0.0, f64::max)
     }
 
     fn area(&self) -> f64 {

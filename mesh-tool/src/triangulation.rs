@@ -3,6 +3,7 @@
 //! Membership is topological: starting outside, the winding number of a sheet changes by one wherever one of its
 //! border edges is crossed. No point-in-polygon test can fall on the wrong side of a sliver that way.
 
+use crate::hidden::HIDDEN;
 use crate::planar::{Border, PlanarGraph};
 use glam::DVec2;
 use interchange::Error;
@@ -89,7 +90,7 @@ impl Triangulation {
             .flat_map(|(k, edge)| [((edge.from, edge.to), k as u32), ((edge.to, edge.from), k as u32)])
             .collect();
         // spade counts its outer face as number 0.
-        let triangles = cdt
+        let triangles: Vec<Triangle> = cdt
             .inner_faces()
             .map(|face| {
                 let edges = face.adjacent_edges();
@@ -101,6 +102,14 @@ impl Triangulation {
                 Triangle { corners, neighbours, constraints, region: 0 }
             })
             .collect();
+        // An edge that runs through a point becomes two constraints, of which one may be an edge, too: then the counts
+        // agree, but the border has a gap.
+        let mut found = vec![false; graph.edges.len()];
+        let constraints = triangles.iter().flat_map(|triangle| triangle.constraints);
+        constraints.flatten().for_each(|edge| found[edge as usize] = true);
+        if !triangles.is_empty() && found.contains(&false) {
+            return Err(Trouble::Tangled);
+        }
         let mut triangulation = Triangulation { triangles, regions: Vec::new() };
         triangulation.flood(graph);
         Ok(triangulation)
@@ -114,6 +123,12 @@ impl Triangulation {
     /// The sheets a triangle lies in, with their winding numbers, in rising order.
     pub fn sheets(&self, triangle: usize) -> impl Iterator<Item = (u32, i32)> + '_ {
         self.regions[self.triangles[triangle].region as usize].iter().copied()
+    }
+
+    /// Whether a triangle lies in some sheet and is not hidden.
+    pub fn is_lit(&self, triangle: usize) -> bool {
+        let held = || self.sheets(triangle).filter(|&(_, winding)| winding > 0);
+        held().next().is_some() && held().all(|(sheet, _)| sheet != HIDDEN)
     }
 
     /// Finds the winding numbers of all triangles from the outside in.
@@ -178,6 +193,13 @@ impl Triangulation {
     }
 }
 
+/// Where the triangulation puts a point: points with equal places cannot be told apart.
+pub fn grid_place(uv: DVec2) -> [u64; 2] {
+    let Point2 { x, y } = key(uv);
+    // Adding zero makes one of the two zeros.
+    [x + 0.0, y + 0.0].map(f64::to_bits)
+}
+
 /// What spade sees of a point.
 fn key(uv: DVec2) -> Point2<f64> {
     let round = |x: f64| (x * GRID).round() / GRID;
@@ -196,6 +218,17 @@ mod tests {
             graph.point(Point { uv, position: uv.extend(0.0), place: None })
         });
         graph.ring(&corners, Border { sheet, forward: true });
+    }
+
+    /// Three points in a row, an edge from the first to the last and one from the middle to the last.
+    #[test]
+    fn edge_through_a_point_is_tangled_although_constraints_are_as_many_as_edges() {
+        let mut graph = PlanarGraph::default();
+        square(&mut graph, 0.0, 1.0, 0);
+        let middle = DVec2::new(0.5, 0.0);
+        let middle = graph.point(Point { uv: middle, position: middle.extend(0.0), place: None });
+        graph.border(middle, 1, Border { sheet: 1, forward: true });
+        assert_eq!(graph.triangulate().unwrap_err(), Trouble::Tangled);
     }
 
     #[test]

@@ -42,7 +42,7 @@ fn build_writes_mesh_table_surfaces_and_report() {
     assert_eq!(report["flags"][0], "--elements 200");
     let names: Vec<&str> =
         report["phases"].as_array().unwrap().iter().filter_map(|p| p["name"].as_str()).collect();
-    assert_eq!(names, ["read", "clean", "lines", "triangulate", "assemble", "write"]);
+    assert_eq!(names, ["read", "clean", "regions", "lines", "triangulate", "assemble", "write"]);
 }
 
 #[test]
@@ -137,9 +137,12 @@ fn bad_usage_is_refused_with_exit_code_2() {
         &["--max-edge=inf"],
         &["--elements", "0"],
         &["--elements", "1.5"],
-        &["--discontinuity", "d1"],
-        &["--refine-with", "s.sol"],
-        &["--tolerance", "0.1"],
+        &["--discontinuity", "d3"],
+        &["--no-clean", "wash"],
+        &["--no-skip", "rope"],
+        &["--sources", "2"],
+        &["--refine-tolerance", "0.1"],
+        &["--tolerance", "0"],
         &["--threads", "0"],
     ] {
         let output = tool(&folder).args(build).args(flags).output().unwrap();
@@ -148,7 +151,7 @@ fn bad_usage_is_refused_with_exit_code_2() {
     assert!(!folder.join("s.mesh").exists());
     let help = text_of(&tool(&folder).args(["build", "--help"]).output().unwrap());
     assert!(
-        help.contains("--max-edge") && !help.contains("--discontinuity") && !help.contains("--refine-with")
+        help.contains("--max-edge") && help.contains("--discontinuity") && help.contains("--refine-with")
     );
     let compare = tool(&folder).args(["compare", "a.mesh", "b.mesh"]).output().unwrap();
     assert_eq!(compare.status.code(), Some(2));
@@ -165,6 +168,33 @@ fn scene_is_never_overwritten() {
         assert!(text_of(&output).contains("is an input"));
     }
     assert_eq!(std::fs::read(folder.join("goral_cube.obj")).unwrap(), before);
+}
+
+#[test]
+fn pictures_are_drawn_and_planes_chosen() {
+    let (_keep, folder) = cube();
+    tool(&folder).args(["build", "goral_cube.obj", "-o", "s.mesh", "--elements", "100"]).assert().success();
+    tool(&folder).args(["picture", "s.mesh", "-o", "s.svg"]).assert().success();
+    tool(&folder).args(["picture", "s.mesh", "-o", "one.svg", "--plane", "1"]).assert().success();
+    tool(&folder).args(["picture", "s.mesh", "-o", "s.png"]).assert().success();
+    let svg = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+    assert_eq!((svg("s.svg").matches("<text").count(), svg("one.svg").matches("<text").count()), (6, 1));
+    assert!(std::fs::read(folder.join("s.png")).unwrap().starts_with(b"\x89PNG"));
+    for flags in [&["-o", "s.gif"][..], &["-o", "t.svg", "--plane", "7"], &["-o", "s.mesh"]] {
+        let output = tool(&folder).args(["picture", "s.mesh"]).args(flags).output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{flags:?}");
+    }
+}
+
+#[test]
+fn tolerance_that_no_mesh_meets_is_written_with_exit_code_3() {
+    let (_keep, folder) = cube();
+    let output = tool(&folder)
+        .args(["build", "goral_cube.obj", "-o", "s.mesh", "--tolerance", "1e-3", "--elements", "500"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(3), "{}", text_of(&output));
+    assert!(folder.join("s.mesh").exists());
 }
 
 #[test]

@@ -6,8 +6,10 @@ use common::*;
 use geometry::polygon;
 use glam::DVec3;
 use interchange::ids::{FaceId, NodeId};
-use interchange::mesh::Mesh;
+use interchange::mesh::{Line, Mesh};
 use interchange::provenance::Provenance;
+use mesh_tool::Options;
+use mesh_tool::discontinuity::Order;
 use std::collections::{HashMap, HashSet};
 
 fn group_face(mesh: &Mesh, name: &str) -> FaceId {
@@ -22,8 +24,15 @@ fn cornell_box_is_covered_conforming_and_well_shaped() {
     assert!((count / 3000.0 - 1.0).abs() < 0.15, "{count} elements");
     assert_areas(&mesh, 1e-12);
     assert!(assert_conforming(&mesh) > 4000);
-    assert!(report.estimates["smallest angle deg"] > 20.0, "{}", report.estimates["smallest angle deg"]);
-    assert!(report.estimates["median smallest angle deg"] > 45.0);
+    // Curvature lines cross at down to one degree: within such a wedge, and beside its tip, angles cannot be wide.
+    let narrow = report.counters["elements below 25 deg that no line or border forces"];
+    assert!(narrow < 100, "{narrow}");
+    assert!(report.estimates["median smallest angle deg"] > 43.0);
+    let slope = Options { discontinuity: Some(Order::D1), ..elements(3000) };
+    let (_, report) = made(&read("cornell_blocks.obj"), slope);
+    assert_eq!(report.counters["elements below 25 deg that no line or border forces"], 0);
+    assert_eq!(report.counters["neighbours of more than twice the size"], 0);
+    assert!(report.estimates["smallest angle deg"] > 25.0);
     assert!(mesh.element_nodes.rows().all(|nodes| nodes.len() == 6));
     // Published vertices are kept to the last bit.
     for vertex in read("cornell_blocks.obj").vertices {
@@ -43,7 +52,8 @@ fn floor_is_parted_along_the_feet_of_the_blocks() {
     let (mesh, report) = made(&read("cornell_blocks.obj"), elements(2000));
     let floor = group_face(&mesh, "floor");
     assert_eq!(report.counters["contact lines"], 8);
-    assert!(mesh.lines.iter().all(|line| line.face == floor && line.order == 0));
+    let lines: Vec<Line> = mesh.lines.iter().copied().filter(|line| line.order == 0).collect();
+    assert!(lines.iter().all(|line| line.face == floor));
     // The lines are as long as the feet, and every side wall of a block is the source of some.
     let scene = read("cornell_blocks.obj");
     let foot = |a: usize, b: usize| {
@@ -53,11 +63,11 @@ fn floor_is_parted_along_the_feet_of_the_blocks() {
         .iter()
         .map(|&(a, b)| foot(a, b))
         .sum();
-    let lines: f64 =
-        mesh.lines.iter().map(|line| mesh.position(line.from).distance(mesh.position(line.to))).sum();
-    assert!((lines - feet).abs() < 1e-12 * feet, "{lines} against {feet}");
-    assert_eq!(mesh.lines.iter().map(|line| line.source).collect::<HashSet<_>>().len(), 8);
-    // Each line is an edge of two floor elements, and these share no node there.
+    let length: f64 =
+        lines.iter().map(|line| mesh.position(line.from).distance(mesh.position(line.to))).sum();
+    assert!((length - feet).abs() < 1e-12 * feet, "{length} against {feet}");
+    assert_eq!(lines.iter().map(|line| line.source).collect::<HashSet<_>>().len(), 8);
+    // Each line is the border of the floor's elements: what lies under the blocks has none.
     let mut uses: HashMap<[u32; 2], Vec<[NodeId; 3]>> = HashMap::new();
     for element in mesh.element_ids().filter(|&e| mesh.element_face(e) == floor) {
         let (ring, nodes) = (mesh.elements.row(element.index()), mesh.element_nodes.row(element.index()));
@@ -71,15 +81,23 @@ fn floor_is_parted_along_the_feet_of_the_blocks() {
             uses.entry(key).or_default().push(ends);
         }
     }
-    for line in &mesh.lines {
+    for line in &lines {
         let [a, b] = [&line.from, &line.to].map(|v| v.0);
-        let sides = &uses[&[a.min(b), a.max(b)]];
-        assert_eq!(sides.len(), 2);
-        assert!((0..3).all(|k| sides[0][k] != sides[1][k]), "a node is shared across {line:?}");
+        assert_eq!(uses[&[a.min(b), a.max(b)]].len(), 1);
     }
+    let under = mesh.hidden_areas[floor.index()];
+    let blocks: f64 = mesh
+        .element_ids()
+        .filter(|&e| {
+            let top = mesh.element_corners(e)[0].y;
+            mesh.element_corners(e).iter().all(|c| c.y == top) && (top == 165.0 || top == 330.0)
+        })
+        .map(|e| polygon::area(&mesh.element_corners(e)))
+        .sum();
+    assert!((under - blocks).abs() < 1e-9 * blocks, "{under} under blocks of {blocks}");
     // Any other inner edge of the floor shares its three nodes.
     let lines: HashSet<[u32; 2]> =
-        mesh.lines.iter().map(|l| [l.from.0.min(l.to.0), l.from.0.max(l.to.0)]).collect();
+        lines.iter().map(|l| [l.from.0.min(l.to.0), l.from.0.max(l.to.0)]).collect();
     for (edge, sides) in uses.iter().filter(|(edge, sides)| sides.len() == 2 && !lines.contains(*edge)) {
         assert_eq!(sides[0], sides[1], "edge {edge:?}");
     }
@@ -100,8 +118,9 @@ fn no_edge_is_longer_than_asked() {
 #[test]
 fn finer_of_the_two_sizes_wins() {
     let scene = read("goral_cube.obj");
-    let count =
-        |elements, max_edge| made(&scene, mesh_tool::Options { elements, max_edge }).0.element_count() as f64;
+    let count = |elements, max_edge| {
+        made(&scene, mesh_tool::Options { elements, max_edge, ..given() }).0.element_count() as f64
+    };
     let fine = count(None, Some(0.1));
     assert_eq!(count(Some(100), Some(0.1)), fine);
     assert!((count(Some(3000), Some(0.9)) / 3000.0 - 1.0).abs() < 0.15);
@@ -168,19 +187,21 @@ fn scene_in_another_unit_has_the_same_elements() {
         let scene = read(name);
         // About as long as 1500 equal elements' edges; sizes alone, so that no rounding of light can decide.
         let length = (3.0 * read_area(&scene) / 1500.0).sqrt();
-        let (mesh, _) = made(&scene, max_edge(length));
+        let contacts = |length| Options { discontinuity: Some(Order::D0), ..max_edge(length) };
+        let (mesh, _) = made(&scene, contacts(length));
         let (lit, _) = made(&scene, elements(1500));
         for factor in [1e-6, 1e6] {
-            let (other, _) = made(&scaled(&scene, factor), max_edge(length * factor));
+            let (other, _) = made(&scaled(&scene, factor), contacts(length * factor));
             assert_eq!(other.elements, mesh.elements, "{name} x {factor}");
             assert_eq!(other.element_nodes, mesh.element_nodes);
             assert_eq!(other.lines, mesh.lines);
             assert_eq!(other.clusters, mesh.clusters);
             // Rays that graze an edge may see either side of it in another unit, and so choose other triangles.
+            // Lines that meet at one point by construction do so but for rounding, which chooses between triangles, too.
             let (other, _) = made(&scaled(&scene, factor), elements(1500));
             assert_areas(&other, 1e-12);
             let ratio = other.element_count() as f64 / lit.element_count() as f64;
-            assert!((ratio - 1.0).abs() < 0.02, "{name} x {factor}: {ratio}");
+            assert!((ratio - 1.0).abs() < 0.05, "{name} x {factor}: {ratio}");
         }
     }
 }

@@ -73,7 +73,7 @@ mod tests {
         for frame in &frames {
             let to_middle = (middle - frame.camera.eye).normalize();
             assert!(to_middle.abs_diff_eq(frame.camera.forward, 1e-12));
-            assert_eq!(frame.camera.framing, true);
+            assert!(frame.camera.framing);
         }
         let [first, third] = [0, 2].map(|k: usize| frames[k].camera.eye - middle);
         assert!((first + third).abs_diff_eq(DVec3::new(0.0, 2.0 * first.y, 0.0), 1e-9));

@@ -12,7 +12,7 @@ pub const CHANNEL_NAMES: [&str; 3] = ["red", "green", "blue"];
 pub struct Channel {
     /// Diffuse reflectance rho of each element, 0 to 1.
     pub reflectance: Vec<f64>,
-    /// Emitted radiosity E = pi Ke of each element, W m^-2, finite and at least 0.
+    /// Emitted radiosity E = pi Ke of each element, W m^-2, finite. Below 0 only where a prescribed flux takes heat away.
     pub exitance: Vec<f64>,
 }
 
@@ -24,7 +24,7 @@ impl Channel {
 
     /// Whether any element emits.
     pub fn emits(&self) -> bool {
-        self.exitance.iter().any(|&e| e > 0.0)
+        self.exitance.iter().any(|&e| e != 0.0)
     }
 }
 
@@ -50,26 +50,45 @@ pub fn of_mesh(mesh: &Mesh, materials: &[Material]) -> Result<[Channel; 3]> {
     Ok(channels)
 }
 
-/// Channels without their repetitions: a grey scene is solved once.
+/// Exitances that differ by a factor agree with it to this: one rounding each of the factor and of the product.
+const PROPORTIONAL: f64 = 2.0 * f64::EPSILON;
+
+/// Channels without their repetitions: a grey scene is solved once, its light of any colour.
 #[derive(Debug)]
 pub struct Distinct {
     /// Each different channel once.
     pub channels: Vec<Channel>,
     /// Which of them each of the three channels is.
     pub index: [usize; 3],
+    /// What its radiosities have to be multiplied with.
+    pub scale: [f64; 3],
 }
 
 impl Distinct {
-    /// The different ones among `channels`.
+    /// The different ones among `channels`: equal reflectances, and exitances that are the same but for one factor. The
+    /// solution is linear in the exitance.
     pub fn of(channels: &[Channel; 3]) -> Self {
         let mut distinct: Vec<Channel> = Vec::new();
+        let mut scale = [1.0; 3];
         let index = std::array::from_fn(|c| {
-            distinct.iter().position(|known| *known == channels[c]).unwrap_or_else(|| {
-                distinct.push(channels[c].clone());
-                distinct.len() - 1
-            })
+            let factors = distinct.iter().map(|known| factor(known, &channels[c]));
+            match factors.enumerate().find_map(|(d, factor)| factor.map(|factor| (d, factor))) {
+                Some((d, factor)) => {
+                    scale[c] = factor;
+                    d
+                }
+                None => {
+                    distinct.push(channels[c].clone());
+                    distinct.len() - 1
+                }
+            }
         });
-        Self { channels: distinct, index }
+        Self { channels: distinct, index, scale }
+    }
+
+    /// All three, equal or not.
+    pub fn all(channels: &[Channel; 3]) -> Self {
+        Self { channels: channels.to_vec(), index: [0, 1, 2], scale: [1.0; 3] }
     }
 
     /// Name of the first colour that distinct channel `d` stands for.
@@ -77,4 +96,19 @@ impl Distinct {
         let first = self.index.iter().position(|&index| index == d);
         CHANNEL_NAMES[first.unwrap_or(0)]
     }
+}
+
+/// What `known` has to be multiplied with to be `other`, if there is such a number.
+fn factor(known: &Channel, other: &Channel) -> Option<f64> {
+    if known.reflectance != other.reflectance || known.emits() != other.emits() {
+        return None;
+    }
+    if known.exitance == other.exitance {
+        return Some(1.0);
+    }
+    let brightest = (0..known.exitance.len())
+        .max_by(|&a, &b| known.exitance[a].abs().total_cmp(&known.exitance[b].abs()))?;
+    let factor = other.exitance[brightest] / known.exitance[brightest];
+    let same = |(a, b): (&f64, &f64)| (a * factor - b).abs() <= PROPORTIONAL * b.abs();
+    (factor.is_finite() && known.exitance.iter().zip(&other.exitance).all(same)).then_some(factor)
 }

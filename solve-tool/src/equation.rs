@@ -13,6 +13,10 @@ pub(crate) struct Equation<'a> {
     pub areas: &'a [f64],
     /// Reflectances; 0 on rows that take no part.
     pub reflectance: &'a [f64],
+    /// Emitted radiosity; empty where the right-hand side is no emission.
+    pub exitance: &'a [f64],
+    /// S rho, W, where it is known: the image of the constant mode.
+    pub seen: Option<&'a [f64]>,
     /// Iterate.
     pub irradiance: Vec<f64>,
     /// Residual of the iterate.
@@ -22,7 +26,8 @@ pub(crate) struct Equation<'a> {
 impl<'a> Equation<'a> {
     /// Starts from H = 0, whose residual is the right-hand side itself.
     pub fn new(areas: &'a [f64], reflectance: &'a [f64], right_hand_side: Vec<f64>) -> Self {
-        Self { areas, reflectance, irradiance: vec![0.0; areas.len()], residual: right_hand_side }
+        let irradiance = vec![0.0; areas.len()];
+        Self { areas, reflectance, exitance: &[], seen: None, irradiance, residual: right_hand_side }
     }
 
     /// Power of the second-kind residual E + rho F B - B of B = E + rho H: sum of A |rho r / A|, W.
@@ -35,15 +40,16 @@ impl<'a> Equation<'a> {
         self.irradiance.iter().zip(self.reflectance).map(|(h, rho)| rho * h).collect()
     }
 
+    /// Radiosity that has arrived according to the iterate and was not yet passed on, rho r / A.
+    pub fn unshot(&self) -> Vec<f64> {
+        let terms = self.residual.iter().zip(self.areas).zip(self.reflectance);
+        terms.map(|((r, area), rho)| rho * r / area).collect()
+    }
+
     /// Replaces the residual by the true one, given `arriving` = S B of the iterate's B, W.
     pub fn set_residual(&mut self, arriving: &[f64]) {
         let terms = arriving.iter().zip(self.areas).zip(&self.irradiance);
         self.residual = terms.map(|((power, area), h)| power - area * h).collect();
-    }
-
-    /// Number of unknowns: rows that reflect.
-    pub fn unknowns(&self) -> usize {
-        self.reflectance.iter().filter(|&&rho| rho > 0.0).count()
     }
 }
 

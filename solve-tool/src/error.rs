@@ -34,6 +34,14 @@ pub enum SolveError {
         /// What to do.
         remedy: &'static str,
     },
+    /// A method that a matrix without symmetry cannot be given to.
+    #[error(
+        "--solver {solver} needs a symmetric matrix, and this one is not; use --solver gmres (or auto), which takes any"
+    )]
+    NeedsSymmetry {
+        /// Name of the method.
+        solver: String,
+    },
     /// A direct solve that would not fit into memory.
     #[error(
         "--solver direct factors a dense matrix of {unknowns} unknowns, at most {most} are taken (its time grows with \
@@ -44,6 +52,17 @@ pub enum SolveError {
         unknowns: usize,
         /// Limit.
         most: usize,
+    },
+    /// Heat that is not there.
+    #[error(
+        "group {group}: its net flux of {flux} W m^-2 draws more heat out than arrives: its temperature would have to be \
+         below absolute zero; draw less, or heat another group"
+    )]
+    BelowZero {
+        /// Name of the group.
+        group: String,
+        /// Its net flux.
+        flux: f64,
     },
     /// An emission beyond the range of f64.
     #[error("material {material}: Ke {radiance:?} times pi is not a finite number; use other units")]

@@ -7,8 +7,10 @@
 //!
 //! in the power norm: row error times rho / (1 - rho) where rho is uniform, as the furnace shows exactly.
 
-use crate::bound::Amplification;
-use crate::system::System;
+use interchange::matrix::{MatrixRecord, Precision};
+
+/// Tolerance of a matrix below which its entries are stored as f64.
+const LEAST_F32: f64 = 1e-6;
 
 /// What the matrix's errors mean for one channel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -21,40 +23,56 @@ pub struct MatrixError {
     pub amplification: f64,
 }
 
-/// Effect of the matrix's row errors on the radiosity `radiosity` of a channel.
-pub fn matrix_error(
-    system: &System<'_>,
-    reflectance: &[f64],
-    radiosity: &[f64],
-    amplification: &Amplification,
-) -> MatrixError {
-    let (mut wrong, mut power) = (0.0, 0.0);
-    for (i, b) in radiosity.iter().enumerate() {
-        wrong += system.areas[i] * b.abs() * system.row_errors[i];
-        power += system.areas[i] * b.abs();
+/// What a part of the scene, solved by itself, has to do with the matrix's errors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PartPower {
+    /// |(I - K)^-1| there.
+    pub factor: f64,
+    /// Its largest reflectance.
+    pub brightest: f64,
+    /// Power that its row errors misplace, sum of A e B, W.
+    pub wrong: f64,
+}
+
+/// Effect of the matrix's row errors on a channel of which the elements send `power`, sum of A B, in W.
+pub fn matrix_error(parts: &[PartPower], power: f64) -> MatrixError {
+    let wrong: f64 = parts.iter().map(|part| part.wrong).sum();
+    // A black part amplifies nothing, whatever else is known.
+    let factor = |part: &PartPower| if part.brightest > 0.0 { part.factor * part.brightest } else { 0.0 };
+    let changed: f64 = parts
+        .iter()
+        .filter(|part| part.wrong > 0.0 && part.brightest > 0.0)
+        .map(|part| factor(part) * part.wrong)
+        .sum();
+    let largest = parts.iter().map(factor).fold(0.0, f64::max);
+    if power == 0.0 || wrong == 0.0 {
+        return MatrixError { relative: 0.0, row_error: 0.0, amplification: largest };
     }
-    let brightest = reflectance.iter().copied().fold(0.0, f64::max);
-    let row_error = if power > 0.0 { wrong / power } else { 0.0 };
-    // A black scene amplifies nothing, whatever else is known.
-    let factor = if brightest > 0.0 { amplification.factor * brightest } else { 0.0 };
-    let relative = if row_error > 0.0 { factor * row_error } else { 0.0 };
-    MatrixError { relative, row_error, amplification: factor }
+    MatrixError { relative: changed / power, row_error: wrong / power, amplification: changed / wrong }
 }
 
 /// What to tell the user where the matrix is not good enough for the asked error: `asked` is solve-tool's
-/// tolerance, `matrix_tolerance` what the matrix was computed with. `None` where the matrix is good enough.
-pub fn shortfall(error: &MatrixError, asked: f64, matrix_tolerance: f64, channel: &str) -> Option<String> {
+/// tolerance, `matrix` the matrix's own account of itself. `None` where the matrix is good enough.
+pub fn shortfall(error: &MatrixError, asked: f64, matrix: &MatrixRecord, channel: &str) -> Option<String> {
     if error.relative <= asked {
         return None;
     }
     let needed = rounded_down(asked / error.amplification);
+    let stored = match matrix.precision {
+        // Half an ulp of each entry is a row error of its own.
+        Precision::F32 if needed < LEAST_F32 => {
+            ", which stores f64: entries stored as f32 are off by 6e-8 each"
+        }
+        _ => "",
+    };
     let remedy = match needed > 0.0 {
         true => format!(
-            "that needs a matrix with row errors of at most {needed:e}: formfactor-tool compute --tolerance {needed:e}, \
-             or a larger --tolerance here"
+            "that needs a matrix with row errors of at most {needed:e}: formfactor-tool compute --tolerance {needed:e}\
+             {stored}, or a larger --tolerance here"
         ),
         false => "no matrix tolerance helps, because no bound below infinity could be proved".into(),
     };
+    let matrix_tolerance = matrix.tolerance;
     Some(format!(
         "errors of the matrix may change the radiosity by {:.1e} in the {channel} channel (row errors {:.1e} times {:.3} \
          by interreflection; the matrix was asked for {matrix_tolerance:e}), more than the asked {asked:e}; {remedy}",
@@ -87,9 +105,24 @@ mod tests {
 
     #[test]
     fn a_shortfall_names_the_tolerance_it_needs() {
+        let mut matrix = MatrixRecord {
+            elements: 2,
+            mesh: interchange::digest::Digest::of(b"mesh"),
+            precision: Precision::F32,
+            symmetric: true,
+            extended: false,
+            tolerance: 1e-4,
+            part: 0,
+            parts: 1,
+        };
         let error = MatrixError { relative: 9.9e-3, row_error: 1e-4, amplification: 99.0 };
-        assert_eq!(shortfall(&error, 1e-2, 1e-4, "red"), None);
-        let text = shortfall(&error, 1e-6, 1e-4, "red").unwrap_or_default();
-        assert!(text.contains("formfactor-tool compute --tolerance 1e-8"), "{text}");
+        assert_eq!(shortfall(&error, 1e-2, &matrix, "red"), None);
+        let text = shortfall(&error, 1e-6, &matrix, "red").unwrap_or_default();
+        assert!(text.contains("formfactor-tool compute --tolerance 1e-8, which stores f64"), "{text}");
+        let text = shortfall(&error, 1e-3, &matrix, "red").unwrap_or_default();
+        assert!(text.contains("--tolerance 1e-5, or a larger"), "{text}");
+        matrix.precision = Precision::F64;
+        let text = shortfall(&error, 1e-6, &matrix, "red").unwrap_or_default();
+        assert!(text.contains("--tolerance 1e-8, or a larger"), "{text}");
     }
 }

@@ -20,7 +20,7 @@ pub fn describe(path: &Path, as_json: bool) -> interchange::Result<String> {
             })
         })
         .collect();
-    let summary = &solution.summary;
+    let (summary, details) = (&solution.summary, &solution.details);
     let inputs: serde_json::Map<String, Value> =
         provenance.inputs.iter().map(|i| (i.role.clone(), json!(i.digest.to_string()))).collect();
     let data = json!({
@@ -37,6 +37,13 @@ pub fn describe(path: &Path, as_json: bool) -> interchange::Result<String> {
         "version": provenance.version,
         "flags": provenance.flags,
         "inputs": inputs,
+        "snapshot": details.unshot.is_some(),
+        "ambient": details.ambient,
+        "bounds": details.bounds.is_some(),
+        "worst elements": details.error_ranking.as_ref().map(|ranking| worst(ranking, details.element_errors.as_ref())),
+        "worst links": details.error_links.as_ref().map(|links| {
+            links.iter().take(SHOWN).map(|l| json!([l.first + 1, l.second + 1, l.error])).collect::<Vec<_>>()
+        }),
         "report": report,
     });
     if as_json {
@@ -65,10 +72,36 @@ pub fn describe(path: &Path, as_json: bool) -> interchange::Result<String> {
             line("", format!("power {emitted:.6e} = absorbed {absorbed:.6e} + escaped {escaped:.6e}"));
         }
     }
+    if let Some([lower, upper]) = &details.bounds {
+        let widths = lower.iter().zip(upper).flat_map(|(l, u)| (0..3).map(move |c| u[c] - l[c]));
+        line("bounds", format!("at most {:.3e} from lower to upper", widths.fold(0.0, f64::max)));
+    }
+    if let (Some(ranking), Some(errors)) = (&details.error_ranking, &details.element_errors) {
+        for (rank, &i) in ranking.iter().take(SHOWN).enumerate() {
+            let [matrix, solver, elements] = errors[i as usize];
+            let title = if rank == 0 { "worst" } else { "" };
+            line(
+                title,
+                format!(
+                    "element {}: matrix {matrix:.2e}, solver {solver:.2e}, element {elements:.2e} W",
+                    i + 1
+                ),
+            );
+        }
+    }
     line("made by", format!("{} {} {}", provenance.tool, provenance.version, provenance.flags.join(" ")));
     let made_from = [("mesh", origins.mesh), ("matrix", origins.matrix), ("materials", origins.materials)];
     made_from.iter().for_each(|(role, digest)| line(role, digest.short()));
     Ok(text)
+}
+
+/// Elements and links that are shown.
+const SHOWN: usize = 10;
+
+/// Numbers from 1 and contributions of the worst elements.
+fn worst(ranking: &[u32], errors: Option<&Vec<[f64; 3]>>) -> Vec<Value> {
+    let of = |&i: &u32| json!([i + 1, errors.map(|errors| errors[i as usize])]);
+    ranking.iter().take(SHOWN).map(of).collect()
 }
 
 /// Least, mean (over elements, not areas) and largest value of a channel.

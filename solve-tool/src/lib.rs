@@ -1,8 +1,9 @@
 //! Exchange matrix and materials to radiosity: B = E + rho H, H = F B, per element and colour channel.
 //!
-//! [`mod@solve`] finds the radiosity by conjugate gradients or by factorisation and stops when a proved
-//! [`bound`] on the error meets the tolerance; [`error_budget`] says what errors of the matrix add to that, and
-//! [`energy`] where the power went. [`run`], [`export`] and [`info`] are the program's subcommands.
+//! [`mod@solve`] takes the scene apart and has each part solved by a [`mod@method`] until a proved [`bound`] on the error
+//! meets the tolerance; [`mod@bounces`] sums bounces instead. [`error_budget`] says what errors of the matrix add to that,
+//! [`bounds`] encloses every radiosity and says who causes the error, and [`energy`] where the power went. [`thermal`]
+//! makes heat of it. [`run`], [`export`] and [`info`] are the program's subcommands.
 //!
 //! Two parallel plates that see nothing but each other, rho = 1/2, one of them glowing:
 //!
@@ -23,22 +24,33 @@
 //! ```
 //!
 //! # Limitations
-//! The matrix must be whole (one part) and symmetric. Diffuse reflection only; channels do not mix.
+//! The matrix must be whole (one part). Diffuse reflection only; channels do not mix.
 
+pub mod account;
+pub mod bounces;
 pub mod bound;
-mod cg;
+pub mod bounds;
 pub mod channels;
 pub mod components;
-mod direct;
+pub mod discretisation;
 pub mod energy;
 mod equation;
 pub mod error;
 pub mod error_budget;
 pub mod export;
 pub mod info;
+pub mod interval;
 mod kernel;
 pub mod lossless;
+pub mod method;
+mod part;
 pub mod product;
 pub mod run;
+pub mod skips;
+pub mod snapshot;
 pub mod solve;
+pub mod start;
 pub mod system;
+pub mod thermal;
+mod weighted;
+pub mod work;

@@ -44,7 +44,7 @@ pub fn find(
     channel: &Channel,
     name: &'static str,
 ) -> Option<Lossless> {
-    let lit = components.any(|i| channel.exitance[i] > 0.0);
+    let lit = components.any(|i| channel.exitance[i] != 0.0);
     let escape = |i: usize| 1.0 - system.row_sums[i];
     let losing = components.any(|i| channel.reflectance[i] < 1.0 || escape(i) > system.row_errors[i]);
     let component = (0..components.count).find(|&c| lit[c] && !losing[c])?;

@@ -1,9 +1,13 @@
 //! Command line of solve-tool.
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use interchange::grouping::By;
 use interchange::tool::{Common, EXIT_CODES, Finish, exit_code, positive, print_data};
+use solve_tool::export::{ExportRequest, Quantity, Units};
+use solve_tool::interval::Spread;
 use solve_tool::run::SolveRequest;
+use solve_tool::skips::{Skip, Skips};
+use solve_tool::snapshot::Plan;
 use solve_tool::solve::Solver;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -31,17 +35,44 @@ enum Command {
         /// Material table or MTL file in place of the .materials beside the mesh
         #[arg(long, value_name = "FILE")]
         materials: Option<PathBuf>,
+        /// Heat: temperature and emissivity, or net flux, of every group, as a table with the header
+        /// group,emissivity,temperature,flux (K, W m^-2), in place of materials
+        #[arg(long, value_name = "CSV", conflicts_with = "materials")]
+        thermal: Option<PathBuf>,
         /// Solution to write (.sol)
         #[arg(long, short, value_name = "SOL")]
         output: PathBuf,
         /// Method
         #[arg(long, value_enum, default_value_t = Solver::Auto)]
         solver: Solver,
+        /// Stop after K reflections of every ray (0: emission alone) instead of solving
+        #[arg(long, value_name = "K", conflicts_with_all = ["solver", "tolerance", "start", "snapshots", "max_steps"])]
+        bounces: Option<u32>,
+        /// Write a solution after every N steps (southwell: shots), or after those in a list, beside the output
+        #[arg(long, value_name = "N[,N...]", value_parser = Plan::parse)]
+        snapshots: Option<Plan>,
+        /// Older solution on the same mesh to start from
+        #[arg(long, value_name = "SOL")]
+        start: Option<PathBuf>,
+        /// With southwell: elements pass on at once what the balance of power foresees
+        #[arg(long)]
+        overshoot: bool,
+        /// Give up after N steps, each as long as a product with the matrix
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+        max_steps: Option<u64>,
+        /// Bound every radiosity from below and above, and tell the errors of matrix, solver and elements apart; the
+        /// value says how the errors of a row of the matrix are spread
+        #[arg(long, value_name = "SPREAD", value_enum, num_args = 0..=1, require_equals = true,
+            default_missing_value = "rows", conflicts_with = "bounces")]
+        bounds: Option<Spread>,
+        /// Do work that is known to change nothing; several with commas between
+        #[arg(long, value_name = "NAME", value_enum, value_delimiter = ',')]
+        no_skip: Vec<Skip>,
         /// Error to be proved, relative to the emitted power: sum of A |error of B| over sum of A E
         #[arg(long, value_name = "E", default_value = "1e-6", value_parser = positive)]
         tolerance: f64,
     },
-    /// Write radiosity and irradiance as a table
+    /// Write a table: radiosity and irradiance, energy, bounds, errors or heat
     Export {
         /// Solution (.sol)
         solution: PathBuf,
@@ -51,6 +82,15 @@ enum Command {
         /// What a row stands for
         #[arg(long, value_enum)]
         by: By,
+        /// What it tells
+        #[arg(long, value_enum, default_value_t = Quantity::Radiosity)]
+        quantity: Quantity,
+        /// Units of radiosity and energy
+        #[arg(long, value_enum, default_value_t = Units::Radiometric)]
+        units: Units,
+        /// Luminous efficacy of the light for photometric units, lm/W (179: equal-energy white light)
+        #[arg(long, value_name = "LM_PER_W", default_value = "179", value_parser = positive)]
+        efficacy: f64,
         /// Table to write (.csv or .npy)
         #[arg(long, short, value_name = "TABLE")]
         output: PathBuf,
@@ -73,12 +113,47 @@ fn main() -> ExitCode {
 
 fn run(command: Command) -> anyhow::Result<Finish> {
     match command {
-        Command::Solve { matrix, mesh, materials, output, solver, tolerance } => {
-            let request = SolveRequest { matrix, mesh, materials, output, solver, tolerance };
+        Command::Solve {
+            matrix,
+            mesh,
+            materials,
+            thermal,
+            output,
+            solver,
+            bounces,
+            snapshots,
+            start,
+            overshoot,
+            max_steps,
+            bounds,
+            no_skip,
+            tolerance,
+        } => {
+            if overshoot && solver != Solver::Southwell {
+                let message = "--overshoot goes with --solver southwell";
+                Cli::command().error(clap::error::ErrorKind::ArgumentConflict, message).exit();
+            }
+            let request = SolveRequest {
+                matrix,
+                mesh,
+                materials,
+                thermal,
+                output,
+                solver,
+                tolerance,
+                bounces,
+                snapshots,
+                start,
+                overshooting: overshoot,
+                most_steps: max_steps.map(|steps| steps as usize),
+                skips: Skips { done: no_skip },
+                bounds,
+            };
             return Ok(solve_tool::run::run(&request)?);
         }
-        Command::Export { solution, mesh, by, output } => {
-            solve_tool::export::run(&solution, &mesh, by, &output)?;
+        Command::Export { solution, mesh, by, quantity, units, efficacy, output } => {
+            let request = ExportRequest { solution, mesh, by, quantity, units, efficacy, output };
+            solve_tool::export::run(&request)?;
         }
         Command::Info { file, json } => print_data(&solve_tool::info::describe(&file, json)?)?,
     }

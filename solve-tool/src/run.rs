@@ -1,20 +1,29 @@
 //! `solve-tool solve`: files in, solution and report out.
 
-use crate::channels::{self, CHANNEL_NAMES};
+use crate::account;
+use crate::bounces::bounce;
+use crate::bounds::{self, Bounded};
+use crate::channels::{self, Channel};
+use crate::discretisation::{self, ElementResidual, Radiosities};
 use crate::error::{Result, SolveError};
-use crate::error_budget::shortfall;
+use crate::interval::Spread;
 use crate::lossless::Lossless;
-use crate::solve::{ChannelSolution, Solved, Solver, solve};
+use crate::skips::Skips;
+use crate::snapshot::{self, Plan};
+use crate::solve::{Options, Solved, Solver, solve_with};
+use crate::start;
 use crate::system::System;
+use crate::thermal;
+use crate::work::Shown;
 use interchange::atomic_write::refuse_input;
 use interchange::materials_input::load_materials;
 use interchange::matrix::Matrix;
 use interchange::mesh::Mesh;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
-use interchange::solution::{Origins, Solution, Summary};
+use interchange::solution::{Details, Origins, Solution, Summary};
 use interchange::tool::Finish;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Name in provenance and reports.
 const TOOL: &str = "solve-tool";
@@ -32,62 +41,264 @@ pub struct SolveRequest {
     pub mesh: PathBuf,
     /// Materials in place of the table beside the mesh.
     pub materials: Option<PathBuf>,
+    /// Temperatures and emissivities in place of materials.
+    pub thermal: Option<PathBuf>,
     /// The solution to be written.
     pub output: PathBuf,
     /// Method.
     pub solver: Solver,
     /// Bound on the power-norm error relative to the emitted power, above 0.
     pub tolerance: f64,
+    /// Stop after so many bounces instead of solving.
+    pub bounces: Option<u32>,
+    /// When to write snapshots.
+    pub snapshots: Option<Plan>,
+    /// An older solution to start from.
+    pub start: Option<PathBuf>,
+    /// Whether Southwell's relaxation overshoots.
+    pub overshooting: bool,
+    /// Most steps of the iteration.
+    pub most_steps: Option<usize>,
+    /// Work that is left out.
+    pub skips: Skips,
+    /// Whether to bound every radiosity, and how the matrix's errors are spread.
+    pub bounds: Option<Spread>,
+}
+
+impl SolveRequest {
+    /// Flags that change the result.
+    fn flags(&self) -> Vec<String> {
+        let mut flags = match self.bounces {
+            Some(bounces) => vec![format!("--bounces {bounces}")],
+            None => {
+                vec![format!("--solver {}", self.solver.name()), format!("--tolerance {:e}", self.tolerance)]
+            }
+        };
+        if self.overshooting {
+            flags.push("--overshoot".into());
+        }
+        if let Some(steps) = self.most_steps {
+            flags.push(format!("--max-steps {steps}"));
+        }
+        if let Some(spread) = self.bounds {
+            flags.push(format!("--bounds {}", spread.name()));
+        }
+        flags.extend(self.skips.done.iter().map(|skip| format!("--no-skip {}", skip.name())));
+        flags
+    }
+
+    fn inputs(&self) -> impl Iterator<Item = &Path> {
+        let optional = [&self.materials, &self.thermal, &self.start].map(Option::as_ref);
+        let given = self.matrix.iter().chain([&self.mesh]).chain(optional.into_iter().flatten());
+        given.map(PathBuf::as_path)
+    }
 }
 
 /// Solves and writes the solution and its report. Nothing is written where there is no solution.
 pub fn run(request: &SolveRequest) -> Result<Finish> {
-    let given = request.matrix.iter().chain([&request.mesh]).chain(&request.materials);
-    refuse_input(&request.output, given.map(PathBuf::as_path))?;
+    refuse_input(&request.output, request.inputs())?;
     let mut report = Report::new(TOOL, VERSION);
     let (mesh, _, mesh_digest) = report.phase("read mesh", || Mesh::read(&request.mesh))?;
     let matrix = report.phase("map matrix", || Matrix::open_all(&request.matrix))?;
     matrix.belongs_to(&request.mesh, mesh_digest, mesh.element_count())?;
-    refuse_unsupported(&matrix)?;
-    let (materials, materials_digest) =
-        load_materials(&request.mesh, request.materials.as_deref(), &mesh.materials)?;
-    let channels = channels::of_mesh(&mesh, &materials)?;
+    let thermal = request.thermal.as_ref().map(|path| thermal::read(path, &mesh)).transpose()?;
+    let (channels, materials_digest) = match &thermal {
+        Some(table) => (std::array::from_fn(|_| table.channel(&mesh)), table.digest),
+        None => {
+            let given = request.materials.as_deref();
+            let (materials, digest) = load_materials(&request.mesh, given, &mesh.materials)?;
+            (channels::of_mesh(&mesh, &materials)?, digest)
+        }
+    };
+    let start = request.start.as_ref();
+    let start = start.map(|path| start::read(path, &request.mesh, &mesh, mesh_digest)).transpose()?;
 
-    let system = report.phase("row sums", || System::new(&matrix))?;
-    let solved = report.phase("solve", || solve(&system, &channels, request.solver, request.tolerance));
-    let solved = solved.map_err(|error| name_places(error, &mesh))?;
-
-    let solver_name = clap::ValueEnum::to_possible_value(&request.solver);
-    let solver_name = solver_name.as_ref().map_or("auto", |value| value.get_name());
-    let flags = [format!("--solver {solver_name}"), format!("--tolerance {:e}", request.tolerance)];
     let mut provenance = Provenance::new(TOOL, VERSION);
-    for flag in &flags {
-        provenance = provenance.flag(flag.as_str());
+    for flag in request.flags() {
+        provenance = provenance.flag(flag);
     }
-    let provenance = provenance
+    provenance = provenance
         .input("mesh", mesh_digest)
         .input("matrix", matrix.digest())
-        .input("materials", materials_digest);
+        .input(if thermal.is_some() { "thermal" } else { "materials" }, materials_digest);
+    if let Some(start) = &start {
+        provenance = provenance.input("start", start.digest);
+    }
     let origins = Origins { mesh: mesh_digest, matrix: matrix.digest(), materials: materials_digest };
-    let solution = to_solution(&solved, request.tolerance);
-    report.phase("write", || solution.write(&request.output, provenance, origins))?;
 
-    report.flags = flags.to_vec();
+    let system = report.phase("row sums", || System::new(&matrix))?;
+    let scene = Scene { request, channels: &channels, system: &system, provenance, origins };
+    let solved = report.phase("solve", || scene.solve(start.map(|start| start.irradiance)));
+    let mut solved = solved.map_err(|error| name_places(error, &mesh))?;
+    let bounded = match request.bounds {
+        Some(spread) => {
+            let residuals = report.phase("test points", || scene.residuals(&mesh, &solved));
+            Some(report.phase("bounds", || bounds::find(&system, &channels, &solved, &residuals, spread)))
+        }
+        None => None,
+    };
+    report.phase("sharpen", || scene.sharpen(&mut solved));
+
+    let temperatures =
+        thermal.map(|table| table.temperatures(&mesh, &solved.channels[0].irradiance)).transpose()?;
+    let details = scene.all_details(bounded.as_ref(), temperatures);
+    report.phase("write", || scene.write(&solved, details))?;
+    report.flags = request.flags();
     report.flags.push(format!("solved by: {}", solved.method));
-    fill_report(&mut report, &solved, &system, &matrix);
-    let missed = missed(&solved, request.tolerance, matrix.record().tolerance);
+    account::fill(&mut report, &solved, &system, &matrix);
+    if let Some(bounded) = &bounded {
+        account::fill_bounds(&mut report, bounded, &mesh);
+    }
+    let missed = match request.bounces {
+        Some(_) => None,
+        None => account::missed(&solved, request.tolerance, matrix.record()),
+    };
     report.write_beside(&request.output)?;
     Ok(missed.map_or(Finish::Done, Finish::ToleranceMissed))
 }
 
-/// Refuses matrices that are not symmetric: this solver needs symmetric S.
-fn refuse_unsupported(matrix: &Matrix) -> Result<()> {
-    if matrix.record().symmetric {
-        return Ok(());
+/// What is solved, and what the files that come of it carry.
+struct Scene<'a> {
+    request: &'a SolveRequest,
+    channels: &'a [Channel; 3],
+    system: &'a System<'a>,
+    provenance: Provenance,
+    origins: Origins,
+}
+
+impl Scene<'_> {
+    fn solve(&self, start: Option<Vec<[f64; 3]>>) -> Result<Solved> {
+        let request = self.request;
+        if let Some(bounces) = request.bounces {
+            return Ok(bounce(self.system, self.channels, bounces, &request.skips));
+        }
+        let options = Options {
+            solver: request.solver,
+            tolerance: request.tolerance,
+            most_steps: request.most_steps,
+            overshooting: request.overshooting,
+            skips: request.skips.clone(),
+            start,
+        };
+        let Some(plan) = &request.snapshots else {
+            return solve_with(self.system, self.channels, &options, None);
+        };
+        let mut failed = None;
+        let mut view = |count: usize, look: &dyn Fn() -> [Shown; 3]| {
+            if failed.is_none() && plan.wants(count) {
+                failed = self.write_snapshot(count, look()).err();
+            }
+        };
+        let solved = solve_with(self.system, self.channels, &options, Some(&mut view))?;
+        failed.map_or(Ok(solved), Err)
     }
-    let found = "a matrix without its mirror image (not symmetric)".into();
-    let remedy = "run formfactor-tool compute on the mesh";
-    Err(SolveError::Unsupported { path: matrix.path().display().to_string(), found, remedy })
+
+    fn write_snapshot(&self, count: usize, shown: [Shown; 3]) -> Result<()> {
+        let irradiance = interleave(|c| &shown[c].irradiance);
+        let radiosity: Vec<[f64; 3]> = irradiance
+            .iter()
+            .enumerate()
+            .map(|(i, h)| {
+                let reflected = |c: usize| self.channels[c].reflectance[i] * h[c];
+                std::array::from_fn(|c| self.channels[c].exitance[i] + reflected(c))
+            })
+            .collect();
+        let areas = self.system.areas;
+        let power =
+            |values: &[f64]| -> f64 { values.iter().zip(areas).map(|(b, area)| b.abs() * area).sum() };
+        // What is shown is no solution yet, and the ambient term in it no bound: what is left to be shot is told.
+        let left = (0..3).map(|c| power(&shown[c].unshot) / power(&self.channels[c].exitance));
+        let achieved = left.filter(|left| left.is_finite()).fold(0.0, f64::max);
+        let solver = format!("{}, snapshot after {count}", self.request.solver.name());
+        let solution = Solution {
+            radiosity,
+            irradiance,
+            history: Vec::new(),
+            summary: Summary { solver, tolerance: self.request.tolerance, achieved },
+            details: Details {
+                unshot: Some(interleave(|c| &shown[c].unshot)),
+                ambient: Some(std::array::from_fn(|c| shown[c].ambient)),
+                ..self.details()
+            },
+        };
+        let path = snapshot::path_for(&self.request.output, count);
+        refuse_input(&path, self.request.inputs())?;
+        let provenance = self.provenance.clone().flag(format!("--snapshots {count}"));
+        solution.write(&path, provenance, self.origins)?;
+        Ok(())
+    }
+
+    fn details(&self) -> Details {
+        let exitance = Some(interleave(|c| &self.channels[c].exitance));
+        Details { exitance, row_sums: Some(self.system.row_sums.clone()), ..Details::default() }
+    }
+
+    /// What is not constant on the elements, at test points.
+    fn residuals(&self, mesh: &Mesh, solved: &Solved) -> Vec<ElementResidual> {
+        let reflectance = interleave(|c| &self.channels[c].reflectance);
+        let exitance = interleave(|c| &self.channels[c].exitance);
+        let radiosity = interleave(|c| &solved.channels[c].radiosity);
+        let (reflectance, exitance, radiosity) = (&reflectance[..], &exitance[..], &radiosity[..]);
+        discretisation::residuals(mesh, Radiosities { reflectance, exitance, radiosity })
+    }
+
+    /// Looks closer at the matrix's errors where they are more than was asked.
+    fn sharpen(&self, solved: &mut Solved) {
+        if self.request.bounces.is_some() {
+            return;
+        }
+        let mut products = 0;
+        for c in 0..3 {
+            let earlier = (0..c).find(|&earlier| self.channels[earlier] == self.channels[c]);
+            if let Some(earlier) = earlier {
+                solved.channels[c].matrix_error = solved.channels[earlier].matrix_error;
+            } else if solved.channels[c].matrix_error.relative > self.request.tolerance {
+                products += bounds::sharpen(self.system, &self.channels[c], &mut solved.channels[c]);
+            }
+        }
+        if products > 0 {
+            solved.counters.push(("products for matrix errors".into(), products));
+        }
+    }
+
+    /// What the solution holds besides.
+    fn all_details(&self, bounded: Option<&Bounded>, thermal: Option<Vec<[f64; 2]>>) -> Details {
+        let details = Details { thermal, ..self.details() };
+        match bounded {
+            Some(bounded) => Details {
+                bounds: Some([interleave(|c| &bounded.lower[c]), interleave(|c| &bounded.upper[c])]),
+                element_errors: Some(bounded.element_errors.clone()),
+                error_ranking: Some(bounded.ranking.clone()),
+                error_links: Some(bounded.links.clone()),
+                ..details
+            },
+            None => details,
+        }
+    }
+
+    fn write(&self, solved: &Solved, details: Details) -> Result<()> {
+        // A dark channel has no history: its error is 0 throughout.
+        let products = solved.channels.iter().map(|c| c.history.len()).max().unwrap_or(0);
+        let at = |c: usize, k: usize| solved.channels[c].history.get(k).copied().unwrap_or(0.0);
+        let solution = Solution {
+            radiosity: interleave(|c| &solved.channels[c].radiosity),
+            irradiance: interleave(|c| &solved.channels[c].irradiance),
+            history: (0..products).map(|k| std::array::from_fn(|c| at(c, k))).collect(),
+            summary: Summary {
+                solver: solved.method.clone(),
+                tolerance: self.request.tolerance,
+                achieved: account::worst_bound(solved),
+            },
+            details,
+        };
+        solution.write(&self.request.output, self.provenance.clone(), self.origins)?;
+        Ok(())
+    }
+}
+
+fn interleave<'a>(channel: impl Fn(usize) -> &'a Vec<f64>) -> Vec<[f64; 3]> {
+    let (r, g, b) = (channel(0), channel(1), channel(2));
+    (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect()
 }
 
 /// Says in the user's words where a lossless component lies.
@@ -111,68 +322,4 @@ fn some(names: impl ExactSizeIterator<Item = String>) -> String {
     let shown: Vec<String> = names.take(MOST_NAMES).collect();
     let more = if rest > 0 { format!(" and {rest} more") } else { String::new() };
     shown.join(", ") + &more
-}
-
-fn to_solution(solved: &Solved, tolerance: f64) -> Solution {
-    let [red, green, blue] = &solved.channels;
-    let interleave = |values: fn(&ChannelSolution) -> &Vec<f64>| -> Vec<[f64; 3]> {
-        let (r, g, b) = (values(red), values(green), values(blue));
-        (0..r.len()).map(|i| [r[i], g[i], b[i]]).collect()
-    };
-    // A dark channel has no history: its error is 0 throughout.
-    let products = solved.channels.iter().map(|c| c.history.len()).max().unwrap_or(0);
-    let at = |channel: &ChannelSolution, k: usize| channel.history.get(k).copied().unwrap_or(0.0);
-    let history = (0..products).map(|k| [at(red, k), at(green, k), at(blue, k)]).collect();
-    let summary = Summary { solver: solved.method.clone(), tolerance, achieved: worst_bound(solved) };
-    Solution {
-        radiosity: interleave(|c| &c.radiosity),
-        irradiance: interleave(|c| &c.irradiance),
-        history,
-        summary,
-    }
-}
-
-fn worst_bound(solved: &Solved) -> f64 {
-    solved.channels.iter().map(|c| c.bound).fold(0.0, f64::max)
-}
-
-fn fill_report(report: &mut Report, solved: &Solved, system: &System<'_>, matrix: &Matrix) {
-    report.count("elements", system.areas.len());
-    report.count("stored entries", system.product.stored_entries());
-    for (name, amount) in &solved.counters {
-        report.count(name, *amount);
-    }
-    report.estimate("matrix tolerance asked", matrix.record().tolerance);
-    report.estimate("solver bound", worst_bound(solved));
-    for (name, channel) in CHANNEL_NAMES.iter().zip(&solved.channels) {
-        report.estimate(&format!("solver bound {name}"), channel.bound);
-        report.estimate(&format!("row error {name}"), channel.matrix_error.row_error);
-        report.estimate(&format!("row error amplification {name}"), channel.matrix_error.amplification);
-        report.estimate(&format!("matrix error {name}"), channel.matrix_error.relative);
-        report.estimate(&format!("power emitted {name}"), channel.energy.emitted);
-        report.estimate(&format!("power absorbed {name}"), channel.energy.absorbed);
-        report.estimate(&format!("power escaped {name}"), channel.energy.escaped);
-        report.estimate(&format!("energy defect {name}"), channel.energy.defect);
-    }
-    for warning in &solved.warnings {
-        report.warn(warning.as_str());
-    }
-}
-
-/// Why the asked tolerance does not hold, if it does not: the solver's own bound first, else the matrix's errors.
-fn missed(solved: &Solved, tolerance: f64, matrix_tolerance: f64) -> Option<String> {
-    let bounds = CHANNEL_NAMES.iter().zip(&solved.channels);
-    let worst = bounds.max_by(|a, b| a.1.bound.total_cmp(&b.1.bound)).filter(|(_, c)| c.bound > tolerance);
-    if let Some((name, channel)) = worst {
-        return Some(format!(
-            "the bound on the solver's error stopped falling at {:.1e} in the {name} channel, above the asked \
-             {tolerance:e}; the best iterate was written; a larger --tolerance or a smaller formfactor-tool --tolerance \
-             helps",
-            channel.bound
-        ));
-    }
-    let errors = CHANNEL_NAMES.iter().zip(&solved.channels);
-    let (name, channel) =
-        errors.max_by(|a, b| a.1.matrix_error.relative.total_cmp(&b.1.matrix_error.relative))?;
-    shortfall(&channel.matrix_error, tolerance, matrix_tolerance, name)
 }

@@ -1,34 +1,49 @@
-//! From system and channels to radiosity: chooses the method, runs it until the proved bound meets the tolerance,
-//! and accounts for what came out.
+//! From system and channels to radiosity: finds the parts that have to be solved, has each solved until its proved
+//! bound meets the tolerance, and accounts for what came out.
 
 use crate::bound::{Amplification, Proof};
-use crate::cg;
 use crate::channels::{Channel, Distinct};
 use crate::components::Components;
-use crate::direct::{AUTO_UNKNOWNS, Factor, MOST_UNKNOWNS};
 use crate::energy::Energy;
-use crate::equation::{Equation, apply};
 use crate::error::{Result, SolveError};
-use crate::error_budget::{MatrixError, matrix_error};
+use crate::error_budget::{MatrixError, PartPower, matrix_error};
 use crate::lossless;
+pub use crate::method::Solver;
+use crate::part::{Outcome, PartChannel, PartSolution, solve_part};
+use crate::skips::{Skip, Skips};
 use crate::system::System;
+use crate::work::{End, Shown};
 
-/// A method that solves the system.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub enum Solver {
-    /// Direct for few unknowns, conjugate gradients otherwise
-    Auto,
-    /// Conjugate gradients
-    Cg,
-    /// Cholesky factorisation
-    Direct,
+/// Parts that are solved one by one; where there are more, the smallest are one part.
+const MOST_PARTS: usize = 64;
+
+/// How to solve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// Method.
+    pub solver: Solver,
+    /// Bound on the power-norm error relative to the emitted power, above 0.
+    pub tolerance: f64,
+    /// Most steps of the iteration in each part.
+    pub most_steps: Option<usize>,
+    /// Whether Southwell's relaxation overshoots.
+    pub overshooting: bool,
+    /// Work that is left out.
+    pub skips: Skips,
+    /// Irradiance of an older solution to start from, per element.
+    pub start: Option<Vec<[f64; 3]>>,
 }
 
-/// Restarts from the true residual, where rounding has led the recursive one astray. Each has to halve the bound.
-const MOST_RESTARTS: usize = 10;
+impl Options {
+    /// This method to this tolerance; everything else as it is by default.
+    pub fn new(solver: Solver, tolerance: f64) -> Self {
+        let skips = Skips::default();
+        Self { solver, tolerance, most_steps: None, overshooting: false, skips, start: None }
+    }
+}
 
 /// The solution of one channel.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct ChannelSolution {
     /// B = E + rho H, W m^-2.
     pub radiosity: Vec<f64>,
@@ -38,6 +53,10 @@ pub struct ChannelSolution {
     pub history: Vec<f64>,
     /// The last of them; 0 for a dark channel.
     pub bound: f64,
+    /// How the iteration ended, in the part where it went worst.
+    pub end: End,
+    /// |(I - K)^-1| in the power norm, in the part where it is largest; 1 for a dark channel.
+    pub amplification: f64,
     /// What errors of the matrix may have done.
     pub matrix_error: MatrixError,
     /// Where the power went.
@@ -57,21 +76,45 @@ pub struct Solved {
     pub warnings: Vec<String>,
 }
 
+impl Solved {
+    /// A counter, 0 where nothing was counted.
+    pub fn counter(&self, name: &str) -> usize {
+        self.counters.iter().find(|(known, _)| known == name).map_or(0, |(_, amount)| *amount)
+    }
+}
+
+/// Receives solutions on their way: the number of steps or shots, and the three channels.
+pub type Viewer<'a> = dyn FnMut(usize, &dyn Fn() -> [Shown; 3]) + 'a;
+
 /// Solves the three channels to `tolerance`: the bound on the power-norm error relative to the emitted power.
 ///
 /// The answer is returned also where the tolerance was not met; the bounds tell.
 ///
 /// # Errors
-/// A lossless lit component; a system that is not positive definite; too many unknowns for `Solver::Direct`.
+/// A lossless lit component; a system that is not positive definite; a method that cannot take the system.
 pub fn solve(system: &System<'_>, channels: &[Channel; 3], solver: Solver, tolerance: f64) -> Result<Solved> {
-    let distinct = Distinct::of(channels);
+    solve_with(system, channels, &Options::new(solver, tolerance), None)
+}
+
+/// [`solve`] with all options, and with a viewer of the work in progress.
+///
+/// # Errors
+/// As [`solve`].
+pub fn solve_with(
+    system: &System<'_>,
+    channels: &[Channel; 3],
+    options: &Options,
+    viewer: Option<&mut Viewer<'_>>,
+) -> Result<Solved> {
+    let distinct = match options.skips.has(Skip::EqualChannels) {
+        true => Distinct::of(channels),
+        false => Distinct::all(channels),
+    };
     let lit: Vec<usize> = (0..distinct.channels.len()).filter(|&d| distinct.channels[d].emits()).collect();
     let different = distinct.channels.len();
     let mut counters =
         vec![("distinct channels".into(), different), ("dark channels".into(), different - lit.len())];
-    let mut warnings = Vec::new();
-    let mut solved = vec![None; distinct.channels.len()];
-    let mut method = "none (nothing emits)".to_owned();
+    let mut run = Run::new(system, &distinct, options);
 
     if !lit.is_empty() {
         let components = Components::of(&system.product);
@@ -82,244 +125,241 @@ pub fn solve(system: &System<'_>, channels: &[Channel; 3], solver: Solver, toler
                 return Err(SolveError::Lossless(found));
             }
         }
-        let mut run = Run::new(system, &distinct, &lit, &components);
-        method = run.choose(solver)?;
-        run.solve(&method, tolerance)?;
-        run.account(&mut counters, &mut warnings);
-        for (l, &d) in lit.iter().enumerate() {
-            solved[d] = Some(run.finish(l));
-        }
+        run.solve(&lit, &components, viewer)?;
+        run.account(&lit, &components, &mut counters);
     }
 
-    let dark = ChannelSolution {
-        radiosity: vec![0.0; system.areas.len()],
-        irradiance: vec![0.0; system.areas.len()],
-        ..ChannelSolution::default()
-    };
-    let channels = distinct.index.map(|d| solved[d].clone().unwrap_or_else(|| dark.clone()));
-    Ok(Solved { channels, method, counters, warnings })
+    let channels = std::array::from_fn(|c| run.finish(distinct.index[c], distinct.scale[c], &channels[c]));
+    let method = run.method.unwrap_or_else(|| "none (nothing emits)".to_owned());
+    Ok(Solved { channels, method, counters, warnings: run.warnings })
 }
 
-/// The distinct lit channels on their way.
+/// A distinct channel while its parts are put together.
+struct Whole {
+    irradiance: Vec<f64>,
+    parts: Vec<PartPower>,
+    /// Emitted power and history of each part.
+    histories: Vec<(f64, Vec<f64>)>,
+    end: End,
+    amplification: f64,
+}
+
 struct Run<'a> {
     system: &'a System<'a>,
-    names: Vec<&'static str>,
-    channels: Vec<&'a Channel>,
-    emitted: Vec<f64>,
-    /// Reflectances, 0 where no light can come.
-    reflectances: Vec<Vec<f64>>,
-    amplifications: Vec<Amplification>,
-    /// Iterates H, then F B of the last one.
-    irradiances: Vec<Vec<f64>>,
-    histories: Vec<Vec<f64>>,
-    unlit_elements: usize,
+    distinct: &'a Distinct,
+    options: &'a Options,
+    wholes: Vec<Whole>,
+    method: Option<String>,
+    warnings: Vec<String>,
+    parts: usize,
     products: usize,
+    bound_products: usize,
+    entries_read: u64,
 }
 
 impl<'a> Run<'a> {
-    fn new(system: &'a System<'a>, distinct: &'a Distinct, lit: &[usize], components: &Components) -> Self {
-        let channels: Vec<&Channel> = lit.iter().map(|&d| &distinct.channels[d]).collect();
-        let mut unlit_elements = 0;
-        let reflectances: Vec<Vec<f64>> = channels
-            .iter()
-            .map(|channel| {
-                let reached = components.any(|i| channel.exitance[i] > 0.0);
-                let is_reached = |i: usize| reached[components.of_element[i] as usize];
-                unlit_elements += (0..system.areas.len()).filter(|&i| !is_reached(i)).count();
-                let rho = channel.reflectance.iter().enumerate();
-                rho.map(|(i, &rho)| if is_reached(i) { rho } else { 0.0 }).collect()
-            })
-            .collect();
-        let seen = apply(&system.product, &reflectances);
-        let amplifications = reflectances
-            .iter()
-            .zip(&seen)
-            .map(|(rho, seen)| Amplification::find(system, rho, seen))
-            .collect();
+    fn new(system: &'a System<'a>, distinct: &'a Distinct, options: &'a Options) -> Self {
+        let empty = || Whole {
+            irradiance: vec![0.0; system.areas.len()],
+            parts: Vec::new(),
+            histories: Vec::new(),
+            end: End::Converged,
+            amplification: 1.0,
+        };
         Self {
             system,
-            names: lit.iter().map(|&d| distinct.name(d)).collect(),
-            emitted: channels.iter().map(|c| c.emitted(system.areas)).collect(),
-            histories: vec![Vec::new(); channels.len()],
-            irradiances: Vec::new(),
-            channels,
-            reflectances,
-            amplifications,
-            unlit_elements,
+            distinct,
+            options,
+            wholes: distinct.channels.iter().map(|_| empty()).collect(),
+            method: None,
+            warnings: Vec::new(),
+            parts: 0,
             products: 0,
+            bound_products: 0,
+            entries_read: 0,
         }
     }
 
-    fn unknowns(&self, l: usize) -> usize {
-        self.reflectances[l].iter().filter(|&&rho| rho > 0.0).count()
-    }
-
-    /// The method, with the reason where it was left to the program.
-    fn choose(&self, solver: Solver) -> Result<String> {
-        let unknowns = (0..self.channels.len()).map(|l| self.unknowns(l)).max().unwrap_or(0);
-        match solver {
-            Solver::Cg => Ok("cg".into()),
-            Solver::Direct if unknowns > MOST_UNKNOWNS => {
-                Err(SolveError::TooManyUnknowns { unknowns, most: MOST_UNKNOWNS })
-            }
-            Solver::Direct => Ok("direct".into()),
-            Solver::Auto if unknowns <= AUTO_UNKNOWNS => {
-                Ok(format!("direct (auto: {unknowns} unknowns, at most {AUTO_UNKNOWNS})"))
-            }
-            Solver::Auto => Ok(format!("cg (auto: {unknowns} unknowns, more than {AUTO_UNKNOWNS})")),
-        }
-    }
-
-    /// Iterates until every channel's bound meets the tolerance or can be brought no lower.
-    fn solve(&mut self, method: &str, tolerance: f64) -> Result<()> {
-        let system = self.system;
-        let reflectances = std::mem::take(&mut self.reflectances);
-        let exitances: Vec<&[f64]> = self.channels.iter().map(|c| c.exitance.as_slice()).collect();
-        let mut equations: Vec<Equation<'_>> = system
-            .product
-            .apply(&exitances)
-            .into_iter()
-            .zip(&reflectances)
-            .map(|(direct, rho)| Equation::new(system.areas, rho, direct))
+    /// Solves part after part.
+    fn solve(
+        &mut self,
+        lit: &[usize],
+        components: &Components,
+        mut viewer: Option<&mut Viewer<'_>>,
+    ) -> Result<()> {
+        let (distinct, options) = (self.distinct, self.options);
+        let lit_in: Vec<Vec<bool>> =
+            lit.iter().map(|&d| components.any(|i| distinct.channels[d].exitance[i] != 0.0)).collect();
+        let any_lit = |component: usize| lit_in.iter().any(|lit| lit[component]);
+        // A component of one element exchanges nothing.
+        let mut sizes = vec![0usize; components.count];
+        components.of_element.iter().for_each(|&component| sizes[component as usize] += 1);
+        let skip_unlit = options.skips.has(Skip::UnlitComponents);
+        let mut wanted: Vec<usize> = (0..components.count)
+            .filter(|&component| !skip_unlit || (any_lit(component) && sizes[component] > 1))
             .collect();
-        self.products += 1;
-        let first: Vec<f64> = equations.iter().enumerate().map(|(l, e)| self.bound(l, e)).collect();
-        self.note(&first);
-
-        // Each round improves the iterates by the method and then checks them with the true residual, which the
-        // product for H gives without further cost.
-        let factors = match method.starts_with("direct") {
-            true => Some(self.factors(&reflectances)?),
-            false => None,
+        // Snapshots show everything at the same number of steps.
+        let apart = options.skips.has(Skip::ComponentsApart) && viewer.is_none();
+        wanted.sort_by_key(|&component| (std::cmp::Reverse(sizes[component]), component));
+        let groups: Vec<Vec<usize>> = match apart {
+            true => {
+                let (large, small) = wanted.split_at(wanted.len().min(MOST_PARTS - 1));
+                let rest = (!small.is_empty()).then(|| small.to_vec());
+                large.iter().map(|&component| vec![component]).chain(rest).collect()
+            }
+            false => vec![wanted],
         };
-        let mut bounds = vec![f64::INFINITY; equations.len()];
-        for _ in 0..=MOST_RESTARTS {
-            // A channel that is done stays as it is, so that it does not depend on the others.
-            let open: Vec<bool> = bounds.iter().map(|&bound| bound > tolerance).collect();
-            match &factors {
-                Some((factors, index)) => {
-                    let open = equations.iter_mut().zip(index).zip(&open).filter(|(_, open)| **open);
-                    open.for_each(|((equation, &f), _)| factors[f].improve(equation));
-                }
-                None => self.conjugate_gradients(&mut equations, &open, tolerance)?,
+
+        for group in groups.iter().filter(|group| !group.is_empty()) {
+            let mut chosen = vec![false; components.count];
+            group.iter().for_each(|&component| chosen[component] = true);
+            let component = |i: usize| components.of_element[i] as usize;
+            let members: Vec<bool> = (0..components.of_element.len()).map(|i| chosen[component(i)]).collect();
+            let here: Vec<usize> =
+                (0..lit.len()).filter(|&l| !skip_unlit || group.iter().any(|&c| lit_in[l][c])).collect();
+            if here.is_empty() {
+                continue;
             }
-            let radiosities: Vec<Vec<f64>> =
-                equations.iter().zip(&self.channels).map(|(e, c)| radiosity(c, &e.reflected())).collect();
-            let arriving = apply(&system.product, &radiosities);
-            self.products += 1;
-            for (equation, arriving) in equations.iter_mut().zip(&arriving) {
-                equation.set_residual(arriving);
-            }
-            let now: Vec<f64> =
-                equations.iter().enumerate().map(|(l, e)| self.gathered_bound(l, e)).collect();
-            self.note(&now);
-            let improved =
-                now.iter().zip(&bounds).any(|(now, before)| *now > tolerance && *now <= 0.5 * before);
-            bounds = now;
-            let met = bounds.iter().all(|&bound| bound <= tolerance);
-            self.irradiances = arriving
-                .into_iter()
-                .map(|arriving| arriving.iter().zip(system.areas).map(|(p, a)| p / a).collect())
+            let channels: Vec<PartChannel> = here
+                .iter()
+                .map(|&l| {
+                    let takes_part = |i: usize| members[i] && (!skip_unlit || lit_in[l][component(i)]);
+                    self.part_channel(lit[l], takes_part)
+                })
                 .collect();
-            if met || !improved {
-                break;
-            }
+            let (index, scale) = (distinct.index, distinct.scale);
+            let place = index.map(|d| here.iter().position(|&l| lit[l] == d));
+            let elements = members.len();
+            let dark =
+                || Shown { irradiance: vec![0.0; elements], unshot: vec![0.0; elements], ambient: 0.0 };
+            let mut show = viewer.as_mut().map(|viewer| {
+                move |step: usize, look: &dyn Fn(usize) -> Shown| {
+                    viewer(step, &|| {
+                        std::array::from_fn(|c| {
+                            let mut shown = place[c].map_or_else(dark, look);
+                            let numbers = shown.irradiance.iter_mut().chain(&mut shown.unshot);
+                            numbers.for_each(|x| *x *= scale[c]);
+                            shown.ambient *= scale[c];
+                            shown
+                        })
+                    });
+                }
+            });
+            let observer = show.as_mut().map(|show| show as &mut dyn FnMut(usize, &dyn Fn(usize) -> Shown));
+            let outcome = solve_part(self.system, &members, &channels, options, observer)?;
+            self.merge(&members, &here.iter().map(|&l| lit[l]).collect::<Vec<_>>(), &channels, outcome);
         }
-        drop(equations);
-        self.reflectances = reflectances;
         Ok(())
     }
 
-    /// One factor per distinct reflectance vector, and which of them each channel has.
-    fn factors(&self, reflectances: &[Vec<f64>]) -> Result<(Vec<Factor>, Vec<usize>)> {
-        let (mut factors, mut index, mut owners): (Vec<Factor>, Vec<usize>, Vec<usize>) = Default::default();
-        for (l, rho) in reflectances.iter().enumerate() {
-            let known = owners.iter().position(|&owner| reflectances[owner] == *rho);
-            index.push(known.unwrap_or(factors.len()));
-            if known.is_none() {
-                let factor = Factor::new(&self.system.product, self.system.areas, rho);
-                factors.push(factor.ok_or(SolveError::NotPositiveDefinite { channel: self.names[l] })?);
-                owners.push(l);
-            }
-        }
-        Ok((factors, index))
-    }
-
-    fn conjugate_gradients(
-        &mut self,
-        equations: &mut [Equation<'_>],
-        open: &[bool],
-        tolerance: f64,
-    ) -> Result<()> {
-        let mut histories = Vec::new();
-        let outcome = cg::improve(
-            &self.system.product,
-            equations,
-            |l, e| if open[l] { self.bound(l, e) } else { 0.0 },
-            tolerance,
-            None,
-            |measures| histories.push(measures.to_vec()),
-        );
-        self.products += histories.len();
-        histories.iter().for_each(|measures| self.note(measures));
-        match outcome {
-            Ok(_) => Ok(()),
-            Err(cg::Indefinite(l)) => Err(SolveError::NotPositiveDefinite { channel: self.names[l] }),
+    fn part_channel(&self, d: usize, takes_part: impl Fn(usize) -> bool) -> PartChannel {
+        let channel = &self.distinct.channels[d];
+        let masked = |values: &[f64]| -> Vec<f64> {
+            values.iter().enumerate().map(|(i, &x)| if takes_part(i) { x } else { 0.0 }).collect()
+        };
+        // The distinct channel is the first of those it stands for.
+        let first = self.distinct.index.iter().position(|&index| index == d).unwrap_or(0);
+        let start = self.options.start.as_ref().map(|start| {
+            let own: Vec<f64> = start.iter().map(|irradiance| irradiance[first]).collect();
+            masked(&own)
+        });
+        PartChannel {
+            name: self.distinct.name(d),
+            reflectance: masked(&channel.reflectance),
+            exitance: masked(&channel.exitance),
+            start,
         }
     }
 
-    /// Bound on the error of the iterate's B relative to the emitted power.
-    fn bound(&self, l: usize, equation: &Equation<'_>) -> f64 {
-        let factor = self.amplifications[l].factor;
-        // Without a bound the residual itself has to decide when to stop; what is noted stays infinite.
-        let factor = if factor.is_finite() { factor } else { 1.0 };
-        factor * equation.residual_power() / self.emitted[l]
-    }
-
-    /// Bound on the error of E + rho F B: one bounce more than the iterate's B, which makes the error smaller by |K|.
-    fn gathered_bound(&self, l: usize, equation: &Equation<'_>) -> f64 {
-        self.amplifications[l].norm * self.bound(l, equation)
-    }
-
-    fn note(&mut self, measures: &[f64]) {
-        for (l, &measure) in measures.iter().enumerate() {
-            let known = self.amplifications[l].factor.is_finite();
-            self.histories[l].push(if known { measure } else { f64::INFINITY });
+    fn merge(&mut self, members: &[bool], channels: &[usize], given: &[PartChannel], outcome: Outcome) {
+        self.parts += 1;
+        self.products += outcome.products;
+        self.bound_products += outcome.bound_products;
+        self.entries_read += outcome.entries_read;
+        for ((&d, given), part) in channels.iter().zip(given).zip(outcome.channels) {
+            self.merge_channel(members, d, given, part);
         }
+        self.method = Some(match self.method.take() {
+            Some(known) if known != outcome.method => format!("{known}; {}", outcome.method),
+            _ => outcome.method,
+        });
     }
 
-    fn account(&self, counters: &mut Vec<(String, usize)>, warnings: &mut Vec<String>) {
-        for (l, name) in self.names.iter().enumerate() {
-            let black = self.channels[l].reflectance.iter().filter(|&&rho| rho == 0.0).count();
-            counters.push((format!("unknowns {name}"), self.unknowns(l)));
+    fn merge_channel(&mut self, members: &[bool], d: usize, given: &PartChannel, part: PartSolution) {
+        if part.amplification.proof == Proof::None {
+            self.warnings.push(format!(
+                "{} channel: no bound on the error could be proved (an element sees a mean reflectance of {}); the \
+                 iteration stopped by its residual alone",
+                given.name, part.amplification.norm
+            ));
+        }
+        let whole = &mut self.wholes[d];
+        for i in (0..members.len()).filter(|&i| members[i]) {
+            whole.irradiance[i] = part.irradiance[i];
+        }
+        if part.end != End::Converged {
+            whole.end = part.end;
+        }
+        whole.amplification = whole.amplification.max(part.amplification.factor);
+        let Amplification { factor, .. } = part.amplification;
+        let brightest = given.reflectance.iter().copied().fold(0.0, f64::max);
+        let wrong = (0..members.len()).filter(|&i| members[i]).map(|i| {
+            let radiosity = given.exitance[i] + given.reflectance[i] * part.irradiance[i];
+            self.system.areas[i] * radiosity.abs() * self.system.row_errors[i]
+        });
+        whole.parts.push(PartPower { factor, brightest, wrong: wrong.sum() });
+        whole.histories.push((part.emitted, part.history));
+    }
+
+    fn account(&self, lit: &[usize], components: &Components, counters: &mut Vec<(String, usize)>) {
+        let mut unlit_elements = 0;
+        for &d in lit {
+            let (name, channel) = (self.distinct.name(d), &self.distinct.channels[d]);
+            let reached = components.any(|i| channel.exitance[i] != 0.0);
+            let is_reached = |i: usize| reached[components.of_element[i] as usize];
+            let elements = 0..channel.reflectance.len();
+            let black = channel.reflectance.iter().filter(|&&rho| rho == 0.0).count();
+            let unknowns =
+                elements.clone().filter(|&i| channel.reflectance[i] > 0.0 && is_reached(i)).count();
+            counters.push((format!("unknowns {name}"), unknowns));
             counters.push((format!("rows without reflectance {name}"), black));
-            let amplification = &self.amplifications[l];
-            if amplification.proof == Proof::None {
-                warnings.push(format!(
-                    "{name} channel: no bound on the error could be proved (an element sees a mean reflectance of {}); \
-                     the iteration stopped by its residual alone",
-                    amplification.norm
-                ));
-            }
+            unlit_elements += elements.filter(|&i| !is_reached(i)).count();
         }
-        counters.push(("elements no light can reach".into(), self.unlit_elements));
+        if self.options.start.is_some() {
+            counters.push(("channels started from an older solution".into(), lit.len()));
+        }
+        counters.push(("elements no light can reach".into(), unlit_elements));
+        counters.push(("parts solved apart".into(), self.parts));
         counters.push(("products".into(), self.products));
+        counters.push(("products for bounds".into(), self.bound_products));
+        let left_out = self.system.product.entries_read().saturating_sub(self.entries_read);
+        counters.push(("entries left out of a step".into(), left_out as usize));
     }
 
     /// The finished channel: B = E + rho H with the H of the last product.
-    fn finish(&self, l: usize) -> ChannelSolution {
-        let (system, channel, rho) = (self.system, self.channels[l], &self.reflectances[l]);
-        let irradiance = self.irradiances[l].clone();
-        let reflected: Vec<f64> = rho.iter().zip(&irradiance).map(|(rho, h)| rho * h).collect();
-        let radiosity = radiosity(channel, &reflected);
-        let energy = Energy::of(system, channel, &radiosity, &irradiance);
-        let matrix_error = matrix_error(system, rho, &radiosity, &self.amplifications[l]);
-        let history = self.histories[l].clone();
-        let bound = history.last().copied().unwrap_or(f64::INFINITY);
-        ChannelSolution { radiosity, irradiance, history, bound, matrix_error, energy }
+    fn finish(&self, d: usize, scale: f64, channel: &Channel) -> ChannelSolution {
+        let whole = &self.wholes[d];
+        let irradiance: Vec<f64> = whole.irradiance.iter().map(|h| scale * h).collect();
+        let reflected = irradiance.iter().zip(&channel.reflectance).map(|(h, rho)| rho * h);
+        let radiosity: Vec<f64> = channel.exitance.iter().zip(reflected).map(|(e, b)| e + b).collect();
+        let power: f64 = radiosity.iter().zip(self.system.areas).map(|(b, area)| b.abs() * area).sum();
+        // A channel that is not solved is known exactly: its error is 0 throughout.
+        let emitted: f64 = whole.histories.iter().map(|(emitted, _)| emitted).sum();
+        let length = whole.histories.iter().map(|(_, history)| history.len()).max().unwrap_or(0);
+        let share = |k: usize| -> f64 {
+            let parts = whole.histories.iter().filter(|(_, history)| !history.is_empty());
+            parts.map(|(part, history)| if *part > 0.0 { part / emitted } else { 0.0 } * history[k.min(history.len() - 1)]).sum()
+        };
+        let history: Vec<f64> = (0..length).map(share).collect();
+        ChannelSolution {
+            energy: Energy::of(self.system, channel, &radiosity, &irradiance),
+            bound: history.last().copied().unwrap_or(0.0),
+            history,
+            end: whole.end,
+            amplification: whole.amplification,
+            matrix_error: matrix_error(&whole.parts, power / scale.abs()),
+            radiosity,
+            irradiance,
+        }
     }
-}
-
-fn radiosity(channel: &Channel, reflected: &[f64]) -> Vec<f64> {
-    channel.exitance.iter().zip(reflected).map(|(e, reflected)| e + reflected).collect()
 }

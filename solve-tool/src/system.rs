@@ -17,6 +17,8 @@ pub struct System<'a> {
     pub row_sums: Vec<f64>,
     /// Estimated sum over j of |error of F_ij|, rounding of storage and summation included.
     pub row_errors: Vec<f64>,
+    /// What storage and summation alone do to a row sum of 1.
+    pub rounding: f64,
 }
 
 impl<'a> System<'a> {
@@ -38,6 +40,6 @@ impl<'a> System<'a> {
         let rounding = storage + areas.len() as f64 * f64::EPSILON / 2.0;
         let row_errors =
             row_errors.iter().zip(&row_sums).map(|(error, sum)| error + rounding * sum).collect();
-        Self { product, areas, row_sums, row_errors }
+        Self { product, areas, row_sums, row_errors, rounding }
     }
 }

@@ -146,9 +146,16 @@ fn bad_usage_ends_with_2() {
         ["--tolerance", "nan"],
         ["--tolerance", "-1"],
         ["--tolerance", "inf"],
-        ["--solver", "jacobi"],
-        ["--solver", "southwell"],
-        ["--bounces", "3"],
+        ["--solver", "montecarlo"],
+        ["--bounces", "-1"],
+        ["--bounces", "few"],
+        ["--snapshots", "0"],
+        ["--snapshots", "1,,2"],
+        ["--max-steps", "0"],
+        ["--no-skip", "everything"],
+        ["--overshoot", "--solver=cg"],
+        ["--bounces=1", "--solver=cg"],
+        ["--bounces=1", "--start=a.sol"],
         ["--threads", "0"],
     ] {
         assert_eq!(solve(&room, &output, &bad).0, 2, "{bad:?}");
@@ -247,4 +254,244 @@ fn output_depends_on_files_and_flags_only() {
     assert_eq!(solve(&room, &output, &["--threads", "3", "--solver", "cg", "--quiet"]).0, 0);
     assert_eq!(std::fs::read(&output).unwrap(), bytes);
     assert_eq!(std::fs::metadata(&output).unwrap().modified().unwrap(), time);
+}
+
+fn estimates(room: &Room, name: &str) -> serde_json::Value {
+    let text = std::fs::read_to_string(room.path(&format!("{name}.report.json"))).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+#[test]
+fn every_method_is_there_by_name() {
+    let room = Room::new([0.5, 0.8, 0.9], 0.0);
+    let output = room.path("room.sol");
+    for solver in ["cg", "jacobi", "gauss-seidel", "southwell", "direct", "gmres"] {
+        assert_eq!(solve(&room, &output, &["--solver", solver, "--tolerance", "1e-11"]).0, 0, "{solver}");
+        let solution = Solution::read(&output).unwrap().0;
+        assert_eq!(solution.summary.solver, solver);
+        assert!((solution.radiosity[5][2] - KNOWN[2][2]).abs() < 1e-9, "{solver}");
+    }
+    assert_eq!(solve(&room, &output, &["--solver", "southwell", "--overshoot"]).0, 0);
+    // Too few steps: the best iterate is written, and the exit code says that it is not good enough.
+    let (code, message) = solve(&room, &output, &["--solver", "jacobi", "--max-steps", "3"]);
+    assert!(code == 3 && message.contains("was still falling when the steps were used up"), "{message}");
+    assert!(message.contains("--max-steps"), "{message}");
+    let solution = Solution::read(&output).unwrap().0;
+    // Closed, 0.9 everywhere: after the last product 0.9^4 is under way, and 1 / (1 - 0.9) times that is missing.
+    assert!((solution.summary.achieved - 0.9f64.powi(5) / 0.1).abs() < 1e-9, "{}", solution.summary.achieved);
+}
+
+#[test]
+fn bounces_are_counted_from_the_emission() {
+    let room = Room::new([0.5, 0.8, 0.9], 1e-3);
+    let output = room.path("room.sol");
+    // Wall, floor and ceiling of the green channel (0.8), known.
+    for (bounces, want) in [
+        ("0", [0.0, 0.0, 1.0]),
+        ("1", [0.160035020860, 0.159859916559, 1.0]),
+        ("3", [0.348442499962, 0.348309987398, 1.209920012753]),
+    ] {
+        // Row errors of 1e-3 do not matter: nothing was asked of the error.
+        assert_eq!(solve(&room, &output, &["--bounces", bounces]), (0, String::new()));
+        let (solution, provenance, ..) = Solution::read(&output).unwrap();
+        for (element, want) in [(0, want[0]), (4, want[1]), (5, want[2])] {
+            let got = solution.radiosity[element][1];
+            assert!((got - want).abs() < 1e-9, "{bounces} bounces: {got} for {want}");
+        }
+        assert_eq!(provenance.flags, [format!("--bounces {bounces}")]);
+        let report = estimates(&room, "room.sol");
+        let estimate = |name: &str| report["estimates"][name].as_f64().unwrap();
+        let sum = estimate("power absorbed green") + estimate("power under way green");
+        assert!(
+            (sum - estimate("power emitted green")).abs() < 1e-12 && estimate("energy defect green") < 1e-12
+        );
+    }
+}
+
+#[test]
+fn snapshots_are_solutions_of_their_own() {
+    let room = Room::new([0.5, 0.8, 0.9], 0.0);
+    let output = room.path("room.sol");
+    let southwell = ["--solver", "southwell", "--snapshots", "1,4", "--tolerance", "1e-10"];
+    assert_eq!(solve(&room, &output, &southwell).0, 0);
+    let plain = Solution::read(&output).unwrap().0;
+    let (first, provenance, ..) = Solution::read(&room.path("room.000001.sol")).unwrap();
+    let fourth = Solution::read(&room.path("room.000004.sol")).unwrap().0;
+    assert!(provenance.flags.contains(&"--snapshots 1".to_owned()), "{:?}", provenance.flags);
+    assert_eq!(first.summary.solver, "southwell, snapshot after 1");
+    // The ceiling has shot: all others have rho F of it, and the ambient term on top.
+    let ambient = first.details.ambient.unwrap();
+    let unshot = first.details.unshot.as_ref().unwrap();
+    for (element, factor) in [(0, room::ADJACENT), (4, room::OPPOSITE)] {
+        for (c, rho) in [0.5, 0.8, 0.9].into_iter().enumerate() {
+            assert!((unshot[element][c] - rho * factor).abs() < 1e-12);
+            assert!((first.radiosity[element][c] - rho * (factor + ambient[c])).abs() < 1e-12);
+        }
+    }
+    // Uniform reflectance: rho of one sixth of the power is left on average, and will be shot 1 / (1 - rho) times.
+    assert!((ambient[1] - 0.8 / 6.0 / 0.2).abs() < 1e-12, "{ambient:?}");
+    let error = |s: &Solution| (0..6).map(|i| (s.radiosity[i][1] - plain.radiosity[i][1]).abs()).sum::<f64>();
+    // A uniform cube: the ambient term is nearly all that is missing.
+    assert!(error(&first) < 0.2 && error(&fourth) < 0.2, "{} {}", error(&first), error(&fourth));
+    assert!(!room.path("room.000002.sol").exists());
+
+    let other = room.path("steps.sol");
+    assert_eq!(solve(&room, &other, &["--solver", "jacobi", "--snapshots", "2", "--max-steps", "6"]).0, 3);
+    for count in [2, 4, 6] {
+        let solution = Solution::read(&room.path(&format!("steps.{count:06}.sol"))).unwrap().0;
+        assert_eq!(solution.details.ambient, Some([0.0; 3]));
+    }
+    // Two steps of Jacobi are two bounces.
+    let two = Solution::read(&room.path("steps.000002.sol")).unwrap().0;
+    assert!(
+        (two.radiosity[5][0] - 1.050000009582).abs() < 1e-9
+            && (two.radiosity[0][0] - 0.140017507556).abs() < 1e-9
+    );
+    // A picture of the work in progress changes nothing of the work.
+    assert_eq!(solve(&room, &other, &["--solver", "southwell", "--tolerance", "1e-10"]).0, 0);
+    assert_eq!(Solution::read(&other).unwrap().0, plain);
+}
+
+#[test]
+fn an_older_solution_of_the_mesh_is_a_start_and_another_is_refused() {
+    let room = Room::new([0.5, 0.8, 0.9], 0.0);
+    let (old, output) = (room.path("old.sol"), room.path("room.sol"));
+    assert_eq!(solve(&room, &old, &["--tolerance", "1e-10", "--solver", "cg"]).0, 0);
+    let start = ["--start", old.to_str().unwrap(), "--tolerance", "1e-10", "--solver", "cg"];
+    assert_eq!(solve(&room, &output, &start).0, 0);
+    let (solution, provenance, ..) = Solution::read(&output).unwrap();
+    assert_eq!(provenance.digest_of("start"), Some(Solution::read(&old).unwrap().3));
+    assert!((solution.radiosity[5][2] - KNOWN[2][2]).abs() < 1e-9);
+    // The start is the solution.
+    assert_eq!(estimates(&room, "room.sol")["counters"]["products"], 3);
+    assert_eq!(solve(&room, &old, &start).0, 1, "the start is not written over");
+
+    let (mut foreign, provenance, mut origins, _) = Solution::read(&old).unwrap();
+    origins.mesh = interchange::digest::Digest::of(b"another mesh");
+    foreign.history.clear();
+    foreign.write(&old, provenance, origins).unwrap();
+    let (code, message) = solve(&room, &output, &start);
+    assert!(
+        code == 1 && message.contains("do not belong together") && message.contains("--start"),
+        "{message}"
+    );
+}
+
+#[test]
+fn bounds_errors_and_energy_are_exported() {
+    let room = Room::new([0.5, 0.8, 0.9], 1e-3);
+    let output = room.path("room.sol");
+    let (code, message) = solve(&room, &output, &["--bounds", "--tolerance", "1e-2"]);
+    assert_eq!(code, 0, "{message}");
+    let solution = Solution::read(&output).unwrap().0;
+    let [lower, upper] = solution.details.bounds.as_ref().unwrap();
+    for i in 0..6 {
+        for c in 0..3 {
+            let want = KNOWN[[0, 0, 0, 0, 1, 2][i]][c];
+            assert!(lower[i][c] <= want && want <= upper[i][c] && upper[i][c] < 1.1 * want, "{i} {c}");
+        }
+    }
+    let report = estimates(&room, "room.sol");
+    let estimate = |name: &str| report["estimates"][name].as_f64().unwrap();
+    for what in ["matrix", "solver", "discretisation"] {
+        for norm in ["power", "sup"] {
+            assert!(estimate(&format!("error by {what} green, {norm} norm")) >= 0.0);
+        }
+    }
+    // One patch a face is coarse: that is the largest of the three.
+    assert!(
+        estimate("error by discretisation green, power norm") > estimate("error by matrix green, power norm")
+    );
+    let names: Vec<&String> = report["estimates"].as_object().unwrap().keys().collect();
+    assert!(names.iter().any(|name| name.starts_with("worst element 01: element ")), "{names:?}");
+    assert!(names.iter().any(|name| name.ends_with(" to element 6 of face 7, ceiling")), "{names:?}");
+
+    let export = |quantity: &str, by: &str, more: &[&str]| -> Vec<Vec<String>> {
+        let arguments =
+            ["export", "room.sol", "--mesh", "room.mesh", "--by", by, "--quantity", quantity, "-o", "t.csv"];
+        text(&room, &[&arguments[..], more].concat());
+        let table = std::fs::read_to_string(room.path("t.csv")).unwrap();
+        table
+            .lines()
+            .map(|line| line.replace("floor, polished", "floor").split(',').map(str::to_owned).collect())
+            .collect()
+    };
+    let number = |cell: &str| cell.parse::<f64>().unwrap();
+    let energy = export("energy", "group", &[]);
+    assert_eq!(
+        energy[0].join(","),
+        "group,area,emitted_r,emitted_g,emitted_b,absorbed_r,absorbed_g,absorbed_b,escaped_r,escaped_g,escaped_b"
+    );
+    let sum = |column: usize| energy[1..].iter().map(|row| number(&row[column])).sum::<f64>();
+    for c in 0..3 {
+        let balance = sum(2 + c) - sum(5 + c) - sum(8 + c);
+        assert!(balance.abs() < 1e-2 && (sum(2 + c) - 1.0).abs() < 1e-12, "{balance}");
+    }
+    let lumens = export("energy", "group", &["--units", "photometric"]);
+    assert_eq!(lumens[0].join(","), "group,area,emitted_lm,absorbed_lm,escaped_lm");
+    assert!((number(&lumens[3][2]) - 179.0).abs() < 1e-9, "one watt of equal-energy white");
+    let lux = export("radiosity", "group", &["--units", "photometric", "--efficacy", "100"]);
+    assert_eq!(
+        lux[0].join(","),
+        "group,area,luminance_cd_m2,luminous_exitance_lm_m2,illuminance_lx,efficacy_lm_W"
+    );
+    let h = &solution.irradiance[4];
+    let want = 100.0 * (0.2126 * h[0] + 0.7152 * h[1] + 0.0722 * h[2]);
+    assert!((number(&lux[2][4]) - want).abs() < 1e-12 * want);
+    assert!((number(&lux[2][2]) * std::f64::consts::PI / number(&lux[2][3]) - 1.0).abs() < 1e-14);
+
+    let errors = export("errors", "element", &[]);
+    assert_eq!(errors[0].join(","), "element,area,matrix,solver,discretisation,total");
+    let totals: Vec<f64> = errors[1..].iter().map(|row| number(&row[5])).collect();
+    assert!(totals.windows(2).all(|pair| pair[0] >= pair[1]), "{totals:?}");
+    let ranking = solution.details.error_ranking.as_ref().unwrap();
+    assert_eq!(errors[1][0], (ranking[0] + 1).to_string());
+    let links = export("links", "group", &[]);
+    assert_eq!(links[0].join(","), "first_group,second_group,error");
+    assert_eq!(export("bounds", "element", &[])[0].len(), 8);
+
+    // What the solution does not hold is said, with what to do.
+    assert_eq!(solve(&room, &output, &["--tolerance", "1e-2"]).0, 0);
+    for quantity in ["bounds", "errors", "links", "heat"] {
+        let done = tool()
+            .current_dir(room.folder.path())
+            .args([
+                "export",
+                "room.sol",
+                "--mesh",
+                "room.mesh",
+                "--by",
+                "group",
+                "--quantity",
+                quantity,
+                "-o",
+                "u.csv",
+            ])
+            .output()
+            .unwrap();
+        let message = String::from_utf8(done.stderr).unwrap();
+        assert!(done.status.code() == Some(1) && message.contains("run solve-tool solve --"), "{message}");
+    }
+    assert!(!room.path("u.csv").exists());
+}
+
+/// A matrix that is not symmetric, as an import gives it: the same cube, all entries.
+#[test]
+fn a_matrix_without_symmetry_goes_through_the_program() {
+    let room = Room::new([0.5, 0.8, 0.9], 0.0);
+    let matrix = Matrix::open(&room.matrix).unwrap();
+    let (record, provenance) = (matrix.record().clone(), matrix.provenance().clone());
+    drop(matrix);
+    let record = matrix::MatrixRecord { symmetric: false, ..record };
+    let blocks = [Block::new(BlockKind::Dense, 0..6, 0..6, 0)];
+    let values: Vec<f64> = (0..36).map(|k| room::factor(k / 6, k % 6)).collect();
+    matrix::write(&room.matrix, provenance, record, &blocks, Values::F64(&values), &[1.0; 6], &[0.0; 6])
+        .unwrap();
+    let output = room.path("room.sol");
+    assert_eq!(solve(&room, &output, &["--tolerance", "1e-10"]).0, 0);
+    let solution = Solution::read(&output).unwrap().0;
+    assert_eq!(solution.summary.solver, "gmres (auto: the matrix is not symmetric)");
+    assert!((solution.radiosity[5][2] - KNOWN[2][2]).abs() < 1e-9);
+    let (code, message) = solve(&room, &output, &["--solver", "cg"]);
+    assert!(code == 1 && message.contains("--solver gmres"), "{message}");
 }

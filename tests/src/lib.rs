@@ -2,6 +2,7 @@
 //! compared with a stated tolerance. Test code throughout: a helper that cannot do its work panics and says why.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+pub mod cases;
 pub mod chain;
 pub mod close;
 pub mod damage;

@@ -8,7 +8,7 @@ use interchange::matrix::{self, Block, BlockKind, MatrixRecord, Precision, Value
 use interchange::mesh::{Cluster, FACE_EMITS, Mesh};
 use interchange::provenance::Provenance;
 use interchange::ragged::Ragged;
-use interchange::solution::{Origins, Solution, Summary};
+use interchange::solution::{Details, Origins, Solution, Summary};
 use std::path::{Path, PathBuf};
 
 /// Form factor between the squares, by [`opposed_unit_squares`].
@@ -62,6 +62,7 @@ pub fn mesh() -> Mesh {
         groups: vec!["floor".into(), "lamp é".into()],
         materials: vec!["grey".into(), "light".into()],
         input_face_count: 2,
+        ..Mesh::default()
     }
 }
 
@@ -82,6 +83,7 @@ pub fn solution() -> Solution {
         irradiance: vec![[irradiance; 3], floor.map(|b| FORM_FACTOR * b)],
         history: vec![[0.1, 0.05, 0.025], [0.0; 3]],
         summary: Summary { solver: "cg".into(), tolerance: 1e-6, achieved: 0.0 },
+        details: Details::default(),
     }
 }
 

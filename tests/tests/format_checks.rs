@@ -140,13 +140,22 @@ fn matrices_that_break_an_invariant_are_refused() {
     for (found, changed) in [
         ("part 2 of 2; part 1 is missing", MatrixRecord { part: 1, parts: 2, ..record.clone() }),
         ("part 0 of 0", MatrixRecord { parts: 0, ..record.clone() }),
-        ("symmetric false", MatrixRecord { symmetric: false, ..record.clone() }),
         ("extended true", MatrixRecord { extended: true, ..record.clone() }),
     ] {
         let opened = write(&changed, &[dense], &[0.1], &[1.0, 1.0], &[0.0, 0.0]);
         assert_refused(opened, &path, "header", found);
     }
     write(&record, &[dense], &[0.1], &[1.0, 1.0], &[0.0, 0.0]).expect("the unchanged one is taken");
+
+    // Without symmetry blocks may lie anywhere, but half a square means nothing.
+    let one_way = MatrixRecord { symmetric: false, ..record.clone() };
+    let below = Block { row_start: 1, column_start: 0, ..dense };
+    let both = [dense, Block { offset: 1, ..below }];
+    let matrix = write(&one_way, &both, &[0.1, 0.3], &[1.0, 1.0], &[0.0, 0.0]).expect("blocks on both sides");
+    assert_eq!(matrix.row_sums().unwrap(), [0.1, 0.3]);
+    let triangle = Block::new(BlockKind::Triangle, 0..2, 0..2, 0);
+    let opened = write(&one_way, &[triangle], &[0.0, 0.1, 0.0], &[1.0, 1.0], &[0.0, 0.0]);
+    assert_refused(opened, &path, "block 0", "dense blocks");
 }
 
 #[test]

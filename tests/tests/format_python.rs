@@ -12,7 +12,7 @@ use interchange::solution::Solution;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use tests::chain::Chain;
+use tests::chain::{Chain, Stage};
 use tests::two_squares::{self, Files};
 use tests::{Run, Tolerance, assert_close, run};
 
@@ -187,6 +187,36 @@ fn assert_same_solution(got: &Value, path: &Path) {
     for (name, values) in columns {
         assert_numbers(name, &got["sections"][name], values.iter().flatten().copied());
     }
+    let details = &solution.details;
+    let bounds = details.bounds.as_ref();
+    for (name, values) in [
+        ("exitance", details.exitance.as_ref()),
+        ("unshot", details.unshot.as_ref()),
+        ("lower", bounds.map(|[lower, _]| lower)),
+        ("upper", bounds.map(|[_, upper]| upper)),
+        ("element_errors", details.element_errors.as_ref()),
+    ] {
+        assert_eq!(got["sections"].get(name).is_some(), values.is_some(), "{name}");
+        if let Some(values) = values {
+            assert_numbers(name, &got["sections"][name], values.iter().flatten().copied());
+        }
+    }
+    if let Some(row_sums) = &details.row_sums {
+        assert_numbers("row_sums", &got["sections"]["row_sums"], row_sums.iter().copied());
+    }
+    if let Some(ambient) = &details.ambient {
+        assert_numbers("ambient", &got["sections"]["ambient"], ambient.iter().copied());
+    }
+    if let Some(ranking) = &details.error_ranking {
+        assert_numbers("error_ranking", &got["sections"]["error_ranking"], ranking.iter().map(|&i| i.into()));
+    }
+    if let Some(links) = &details.error_links {
+        let numbers = links.iter().flat_map(|l| [l.first.into(), l.second.into(), l.error]);
+        assert_numbers("error_links", &got["sections"]["error_links"], numbers);
+    }
+    if let Some(thermal) = &details.thermal {
+        assert_numbers("thermal", &got["sections"]["thermal"], thermal.iter().flatten().copied());
+    }
 }
 
 #[test]
@@ -210,6 +240,12 @@ fn python_reads_what_the_tools_write() {
         ["mesh", "materials", "ff", "sol"].map(|ending| chain.path(ending));
     let reader = reader(folder.path());
     assert_same(&reader, &Files { mesh, materials, matrix, solution });
+    // What not every solution has.
+    let optional = ["--bounds", "--snapshots=1", "--tolerance=0.1", "--solver=cg"];
+    let done = run(chain.command_to(Stage::Solve, &chain.path("more.sol")).args(optional));
+    assert!(matches!(done.code, Some(0 | 3)), "{}", done.stderr);
+    assert_same_solution(&json(&reader, &chain.path("more.sol")), &chain.path("more.sol"));
+    assert_same_solution(&json(&reader, &chain.path("more.000001.sol")), &chain.path("more.000001.sol"));
     // Faces as given: polygons with other counts of corners and nodes.
     let mut given = chain.clone();
     given.mesh_flags.clear();

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use serde_json::Value;
-use std::f64::consts::PI;
+use tests::cases::{cases, surfaces_of};
 use tests::chain::Chain;
 use tests::surfaces::{self, Paint, Surface, corners, json, list, number, string};
 use tests::table::Table;
@@ -21,52 +21,6 @@ fn factors(surfaces: &[Surface], tolerance: &str) -> Table {
 #[track_caller]
 fn factor(table: &Table, from: &str, to: &str) -> f64 {
     table.number(table.row_of(from), to)
-}
-
-/// What was independently computed: surfaces, their blockers, and factors by name.
-struct Case {
-    name: String,
-    surfaces: Vec<Surface>,
-    expected: Vec<(String, String, f64)>,
-}
-
-fn surfaces_of(list_of_named: &Value) -> Vec<Surface> {
-    let named = list(list_of_named).iter();
-    named.map(|s| Surface::new(string(&s["name"]), corners(&s["vertices"]))).collect()
-}
-
-/// Regular polygon inscribed in a circle about the z axis.
-fn inscribed(name: &str, radius: f64, sides: usize, height: f64, looks_up: bool) -> Surface {
-    let corner = |k: usize| {
-        let (sin, cos) = (2.0 * PI * k as f64 / sides as f64).sin_cos();
-        [radius * cos, radius * sin, height]
-    };
-    let ring = (0..sides).map(|k| corner(if looks_up { k } else { sides - 1 - k }));
-    Surface::new(name, ring.collect::<Vec<_>>())
-}
-
-/// One case, or for coaxial discs one for each number of sides of the polygons that stand for them.
-fn cases(case: &Value) -> Vec<Case> {
-    let name = string(&case["id"]).to_owned();
-    if string(&case["category"]) == "coaxial-discs" {
-        let discs = |polygon: &Value| {
-            let sides = polygon["n"].as_u64().unwrap() as usize;
-            Case {
-                name: format!("{name} with {sides} sides"),
-                surfaces: vec![
-                    inscribed("disc1", number(&case["r1"]), sides, 0.0, true),
-                    inscribed("disc2", number(&case["r2"]), sides, number(&case["h"]), false),
-                ],
-                expected: vec![("disc1".into(), "disc2".into(), number(&polygon["F"]))],
-            }
-        };
-        return list(&case["inscribed_ngons"]).iter().map(discs).collect();
-    }
-    let mut surfaces = surfaces_of(&case["surfaces"]);
-    surfaces.extend(surfaces_of(&case["obstructions"]));
-    let pair = |e: &Value| (string(&e["frm"]).to_owned(), string(&e["to"]).to_owned(), number(&e["F"]));
-    let expected = list(&case["expected"]).iter().map(pair).collect();
-    vec![Case { name, surfaces, expected }]
 }
 
 /// The factor from a point to a surface: irradiance there when the surface's exitance is 1.

@@ -21,9 +21,8 @@ fn header(file: &PartFile) -> Result<()> {
         let found = format!("part {} of {}", record.part, record.parts);
         return refuse(found, "a part below the number of parts, from 0", "compute the matrix again");
     }
-    if !record.symmetric || record.extended {
-        let found = format!("symmetric {}, extended {}", record.symmetric, record.extended);
-        return refuse(found, "symmetric true, extended false", UPDATE);
+    if record.extended {
+        return refuse("extended true".into(), "extended false", UPDATE);
     }
     Ok(())
 }

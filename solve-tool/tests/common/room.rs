@@ -40,6 +40,7 @@ pub fn mesh() -> Mesh {
         groups: ["walls", "floor, polished", "ceiling"].map(str::to_owned).to_vec(),
         materials: ["grey", "lamp"].map(str::to_owned).to_vec(),
         input_face_count: 7,
+        ..Mesh::default()
     }
 }
 

@@ -4,19 +4,49 @@
 //! With t = sqrt(A rho) H the equation of [`crate::equation`] reads (I - D S D) t = D c, D = diag(sqrt(rho / A)),
 //! on the rows with rho > 0: unit diagonal but for S_ii, symmetric, and no division by rho.
 
+use super::{Indefinite, Method};
 use crate::equation::Equation;
+use crate::part::Setup;
 use crate::product::Product;
+use crate::work::{End, Work};
 use std::ops::ControlFlow;
 
-/// Unknowns up to which `--solver auto` factors: at 256 the factor costs 6e6 multiplications, no more than the ten
-/// products that conjugate gradients take.
-pub const AUTO_UNKNOWNS: usize = 256;
-/// Unknowns up to which a factor is made at all: 1.6 GB and some minutes.
-pub const MOST_UNKNOWNS: usize = 20_000;
+/// The factors of all channels.
+pub(super) struct Direct {
+    factors: Vec<Factor>,
+    /// Which of them each channel has.
+    index: Vec<usize>,
+}
+
+impl Direct {
+    /// Factors the systems, each distinct reflectance once.
+    pub fn new(setup: &Setup<'_>) -> Result<Self, Indefinite> {
+        let (mut factors, mut index, mut owners): (Vec<Factor>, Vec<usize>, Vec<usize>) = Default::default();
+        for (c, rho) in setup.reflectances.iter().enumerate() {
+            let known = owners.iter().position(|&owner| setup.reflectances[owner] == *rho);
+            index.push(known.unwrap_or(factors.len()));
+            if known.is_none() {
+                factors.push(Factor::new(setup.whole, setup.areas, rho).ok_or(Indefinite(c))?);
+                owners.push(c);
+            }
+        }
+        Ok(Self { factors, index })
+    }
+}
+
+impl Method for Direct {
+    fn improve(&mut self, work: &mut Work<'_>) -> Result<(), Indefinite> {
+        for c in work.active() {
+            self.factors[self.index[c]].improve(&mut work.equations[c]);
+            work.finish(c, End::Converged);
+        }
+        Ok(())
+    }
+}
 
 /// Lower triangular factor L with L L^T = I - D S D.
 #[derive(Debug)]
-pub(crate) struct Factor {
+struct Factor {
     /// Elements with rho > 0.
     rows: Vec<usize>,
     /// D on those rows.
@@ -27,7 +57,7 @@ pub(crate) struct Factor {
 
 impl Factor {
     /// Factors the system; `None` where it is not positive definite.
-    pub fn new(product: &Product<'_>, areas: &[f64], reflectance: &[f64]) -> Option<Self> {
+    fn new(product: &Product<'_>, areas: &[f64], reflectance: &[f64]) -> Option<Self> {
         let rows: Vec<usize> = (0..areas.len()).filter(|&i| reflectance[i] > 0.0).collect();
         let scale: Vec<f64> = rows.iter().map(|&i| (reflectance[i] / areas[i]).sqrt()).collect();
         let mut place = vec![None; areas.len()];
@@ -45,7 +75,7 @@ impl Factor {
     }
 
     /// Adds to the iterate the correction that its residual asks for.
-    pub fn improve(&self, equation: &mut Equation<'_>) {
+    fn improve(&self, equation: &mut Equation<'_>) {
         let mut t: Vec<f64> =
             self.rows.iter().zip(&self.scale).map(|(&i, d)| d * equation.residual[i]).collect();
         // L y = D r, row by row.
