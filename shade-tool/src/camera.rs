@@ -181,6 +181,11 @@ impl Camera {
         }
     }
 
+    /// Whether the picture's left and right border are one.
+    pub fn wraps(&self) -> bool {
+        self.projection == Projection::Panorama
+    }
+
     /// The camera turned by an angle (radians) about the axis through `middle` along `axis`, as a scene on a turntable is seen.
     pub fn turned(&self, middle: DVec3, axis: DVec3, angle: f64) -> Camera {
         let turn = glam::DQuat::from_axis_angle(axis.normalize_or(DVec3::Y), angle);

@@ -10,8 +10,11 @@ use crate::lit_scene::LitScene;
 use crate::picture::Picture;
 use crate::refined::Scheme;
 use crate::render::{Quality, Renderer};
+use crate::sheet::SheetArguments;
 use crate::skips::Skip;
-use crate::{TOOL, VERSION, grid, info, points, preview, probe, skips};
+use crate::tone::ToneArguments;
+use crate::view::{View, tell_exposure};
+use crate::{TOOL, VERSION, grid, info, points, probe, skips};
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use glam::DVec3;
@@ -46,6 +49,11 @@ pub enum Command {
     Render(Box<RenderArguments>),
     /// Irradiance at the points of a table, by exact gathering
     Probe(ProbeArguments),
+    /// Look at a picture in another way, without rendering it again: PNG from EXR
+    #[command(subcommand)]
+    View(Box<View>),
+    /// Put pictures side by side with one exposure: a contact sheet
+    Sheet(SheetArguments),
     /// Tell what a picture holds
     Info(InfoArguments),
 }
@@ -136,9 +144,9 @@ pub struct RenderArguments {
     /// Gather more while interpolation is off by more than this part of the value
     #[arg(long, value_name = "E", default_value_t = 0.02, value_parser = positive)]
     pub tolerance: f64,
-    /// Brighten the preview by so many powers of two
-    #[arg(long, value_name = "STOPS", default_value_t = 0.0, value_parser = stops, allow_hyphen_values = true, requires = "png")]
-    pub exposure: f64,
+    /// Exposure and curve of the preview.
+    #[command(flatten)]
+    pub tone: ToneArguments,
 }
 
 /// How light is interpolated over elements.
@@ -216,7 +224,21 @@ pub struct InfoArguments {
 impl Arguments {
     /// Bad usage that single flags do not show.
     pub fn check(&self) -> std::result::Result<(), clap::Error> {
-        let Command::Render(render) = &self.command else { return Ok(()) };
+        let bad = |kind, message: String| Err(Arguments::command().error(kind, message));
+        let render = match &self.command {
+            Command::Render(render) => render,
+            Command::View(view) => {
+                return view.usage().or_else(|message| bad(ErrorKind::ValueValidation, message.into()));
+            }
+            Command::Sheet(sheet) => {
+                return sheet.usage().or_else(|message| bad(ErrorKind::WrongNumberOfValues, message));
+            }
+            Command::Probe(_) | Command::Info(_) => return Ok(()),
+        };
+        if render.tone.given() && render.png.is_none() {
+            let message = "--exposure and --curve are for the preview: give --png";
+            return bad(ErrorKind::MissingRequiredArgument, message.into());
+        }
         if render.camera.is_none() && render.eye.is_some() != render.look_at.is_some() {
             let message = "--eye and --look-at must be given together, or with --camera";
             return Err(Arguments::command().error(ErrorKind::MissingRequiredArgument, message));
@@ -235,6 +257,8 @@ impl Arguments {
         match &self.command {
             Command::Render(arguments) => run_render(arguments, &self.common)?,
             Command::Probe(arguments) => run_probe(arguments, &self.common)?,
+            Command::View(view) => view.run()?,
+            Command::Sheet(arguments) => arguments.run()?,
             Command::Info(arguments) => run_info(arguments)?,
         }
         Ok(Finish::Done)
@@ -284,13 +308,13 @@ fn run_render(arguments: &RenderArguments, common: &Common) -> Result<()> {
                 arguments.tolerance, scene.achieved
             ),
         };
-        report.phase("write", || {
-            exr_file::write(&frame.path(&arguments.output), &picture, precision, &label)?;
-            match &arguments.png {
-                Some(png) => preview::write(&frame.path(png), &picture, arguments.exposure).map(|_| ()),
-                None => Ok(()),
-            }
-        })?;
+        let path = frame.path(&arguments.output);
+        report.phase("write", || exr_file::write(&path, &picture, precision, &label))?;
+        if let Some(png) = &arguments.png {
+            let tone = arguments.tone.fitted(&picture);
+            tell_exposure(&tone, &mut report);
+            report.phase("preview", || tone.shown(&picture).write(&frame.path(png)))?;
+        }
     }
     renderer.count(&mut report);
     report.write_beside(&arguments.output)?;
@@ -390,7 +414,8 @@ impl RenderArguments {
     }
 }
 
-fn ends_in(ending: &'static str) -> impl Fn(&str) -> Result<PathBuf, String> + Clone {
+/// The name of a file with that ending.
+pub fn ends_in(ending: &'static str) -> impl Fn(&str) -> Result<PathBuf, String> + Clone {
     move |text| {
         let path = PathBuf::from(text);
         let found = path.extension().map(|e| e.to_string_lossy().to_lowercase());
@@ -414,7 +439,8 @@ fn not_negative(text: &str) -> Result<f64, String> {
     if x >= 0.0 { Ok(x) } else { Err("expected a number of at least 0".into()) }
 }
 
-fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+/// So many finite numbers with commas.
+pub fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let values: Option<Vec<f64>> =
         text.split(',').map(|part| part.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
     values
@@ -434,11 +460,6 @@ fn film(text: &str) -> Result<[f64; 2], String> {
 fn angle(text: &str) -> Result<f64, String> {
     let degrees = positive(text)?;
     if degrees < 180.0 { Ok(degrees) } else { Err("expected an angle below 180 degrees".into()) }
-}
-
-fn stops(text: &str) -> Result<f64, String> {
-    let [x] = numbers(text)?;
-    if x.abs() <= 100.0 { Ok(x) } else { Err("expected at most 100 stops".into()) }
 }
 
 fn size(text: &str) -> Result<[u32; 2], String> {

@@ -1,6 +1,6 @@
 //! What can go wrong in shading.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Result with [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -27,6 +27,16 @@ pub enum Error {
         /// What to do.
         remedy: String,
     },
+    /// A picture or file that lacks what a view needs.
+    #[error("{}: {found}; {remedy}", path.display())]
+    View {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        found: String,
+        /// What to do.
+        remedy: String,
+    },
     /// An EXR file that the decoder refuses.
     #[error("{}: not a readable OpenEXR file: {found}; remake it with shade-tool render", path.display())]
     Picture {
@@ -46,5 +56,10 @@ impl Error {
     /// A grid without points, or with too many.
     pub fn grid(found: impl Into<String>, remedy: impl Into<String>) -> Error {
         Error::Grid { found: found.into(), remedy: remedy.into() }
+    }
+
+    /// A picture or file that lacks what a view needs.
+    pub fn view(path: &Path, found: impl Into<String>, remedy: impl Into<String>) -> Error {
+        Error::View { path: path.into(), found: found.into(), remedy: remedy.into() }
     }
 }

@@ -3,7 +3,10 @@
 //! [`render`] finds the surface that each sample of a pixel sees ([`visible`]), gathers irradiance at the nodes of the
 //! facets that are seen ([`facets`], [`nodes`], [`node_places`]), cuts facets where interpolation is not good enough ([`refined`]),
 //! interpolates ([`interpolation`]) and writes radiance and layers ([`layers`]) as OpenEXR ([`exr_file`]) and a tone-mapped
-//! preview ([`preview`]), for one camera or several ([`camera`], [`frames`]). [`probe`] gathers irradiance at the points of a
+//! preview ([`tone`]), for one camera or several ([`camera`], [`frames`]). [`view`] reads a picture back ([`exr_reader`])
+//! and shows it tone-mapped, in false colours ([`quantity`], [`colour_scale`]), with isolux contours ([`contours`],
+//! [`isolux`]), with the mesh ([`mesh_overlay`]) or the error of its elements ([`element_error`]); [`sheet`] puts pictures side by
+//! side; both draw on a [`canvas`] with letters of [`font`]. [`probe`] gathers irradiance at the points of a
 //! table or of a grid ([`grid`]). [`info`] tells what a picture holds. [`skips`] names what is left out.
 //!
 //! # Limitations
@@ -12,30 +15,41 @@
 #![forbid(unsafe_code)]
 
 pub mod camera;
+pub mod canvas;
 pub mod coarser;
+pub mod colour_scale;
 pub mod command_line;
+pub mod contours;
 pub mod convex;
+pub mod element_error;
 pub mod error;
 pub mod exr_file;
+pub mod exr_reader;
 pub mod face_elements;
 pub mod facets;
+pub mod font;
 pub mod frames;
 pub mod grid;
 pub mod info;
 pub mod interpolation;
+pub mod isolux;
 pub mod layers;
 pub mod lit_scene;
+pub mod mesh_overlay;
 pub mod node_places;
 pub mod nodes;
 pub mod on_surface;
 pub mod picture;
 pub mod points;
-pub mod preview;
 pub mod probe;
+pub mod quantity;
 pub mod receiver;
 pub mod refined;
 pub mod render;
+pub mod sheet;
 pub mod skips;
+pub mod tone;
+pub mod view;
 pub mod visible;
 
 #[cfg(test)]

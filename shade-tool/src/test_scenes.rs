@@ -1,11 +1,16 @@
 //! Scenes built in code for the tests.
+#![allow(clippy::unwrap_used)]
 
+use crate::exr_file::{self, Label, Precision};
+use crate::exr_reader::StoredPicture;
 use crate::lit_scene::LitScene;
+use crate::picture::Picture;
 use glam::DVec3;
 use interchange::digest::Digest;
 use interchange::ids::{FaceId, GroupId, MaterialId, NodeId, VertexId};
 use interchange::materials::Material;
 use interchange::mesh::{Cluster, FACE_TWO_SIDED, Mesh};
+use interchange::provenance::Provenance;
 
 /// Adds a planar parallelogram as a face with n x n elements, front where `u` x `v` points.
 pub fn add_parallelogram(mesh: &mut Mesh, corner: DVec3, u: DVec3, v: DVec3, n: usize, flags: u32) {
@@ -77,4 +82,14 @@ pub fn cube(n: usize) -> LitScene {
         add_parallelogram(&mut mesh, corner, u, v, n, 0);
     }
     lit(mesh)
+}
+
+/// A picture through its file, as views get it.
+pub fn stored(picture: &Picture) -> StoredPicture {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.exr");
+    let provenance = Provenance::new("shade-tool", "test");
+    let label = Label { provenance: &provenance, camera: None, efficacy: 179.0, remarks: String::new() };
+    exr_file::write(&path, picture, Precision::Float, &label).unwrap();
+    StoredPicture::read(&path).unwrap()
 }

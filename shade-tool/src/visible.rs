@@ -6,6 +6,7 @@ use crate::lit_scene::LitScene;
 use geometry::ray_cast::RayCaster;
 use glam::DVec2;
 use interchange::ids::{ElementId, FaceId};
+use interchange::mesh::Mesh;
 
 /// What lies behind a place of the picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,9 +31,14 @@ pub struct VisibleSurface {
 impl VisibleSurface {
     /// Rays meet the faces' convex pieces, not the elements, which are many more.
     pub fn new(scene: &LitScene) -> VisibleSurface {
-        let mesh = &scene.mesh;
+        VisibleSurface::of_mesh(&scene.mesh)
+    }
+
+    /// As [`VisibleSurface::new`], for a mesh without light.
+    pub fn of_mesh(mesh: &Mesh) -> VisibleSurface {
+        let pieces: Vec<_> = (0..mesh.occluders.len()).map(|piece| mesh.occluder_corners(piece)).collect();
         VisibleSurface {
-            caster: RayCaster::new(&scene.pieces()),
+            caster: RayCaster::new(&pieces),
             piece_faces: mesh.occluder_faces.clone(),
             two_sided: (0..mesh.face_count()).map(|face| mesh.is_two_sided(FaceId::new(face))).collect(),
             elements: FaceElements::new(mesh),

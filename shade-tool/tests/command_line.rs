@@ -257,6 +257,8 @@ fn bad_usage_ends_with_2() {
         "--fov-deg 180",
         "--focal-length -1 --film 1,1",
         "--exposure inf --png s.png",
+        "--exposure auto1 --png s.png",
+        "--curve gamma --png s.png",
         "--png s.jpg",
         "--threads 0",
         // Flags that need others, or exclude them.
@@ -264,6 +266,7 @@ fn bad_usage_ends_with_2() {
         "--camera-name front",
         "--focal-length 1",
         "--exposure 1",
+        "--curve linear",
         "--fov-deg 30 --focal-length 1 --film 1,1",
     ] {
         let (code, stderr) = failure(folder.path(), &format!("{render} {flags}"));
@@ -276,6 +279,17 @@ fn bad_usage_ends_with_2() {
         "probe s.sol --mesh s.mesh -o o.csv",
         "render s.sol --mesh s.mesh -o s.png",
         "probe s.sol --mesh s.mesh --points p.csv -o out.txt",
+        "view s.exr -o v.png",
+        "view tone s.exr -o v.exr",
+        "view tone s.exr -o v.png --step 5",
+        "view mesh s.exr -o v.png",
+        "view false-colour s.exr -o v.png --range 5,1",
+        "view false-colour s.exr -o v.png --range 0,1 --log",
+        "view isolux s.exr -o v.png --step 0",
+        "view isolux s.exr -o v.png --step 1 --levels 1,2",
+        "sheet -o v.png",
+        "sheet a.exr b.exr -o v.png --labels one",
+        "sheet a.exr -o v.png --columns 0",
     ] {
         assert_eq!(failure(folder.path(), line).0, Some(2), "{line}");
     }
@@ -371,4 +385,88 @@ fn layers_are_stored_by_name_and_skips_do_not_change_the_answer() {
         // In a furnace all that is gathered is 1; the lamp's part of the tolerance is a tenth of 0.02.
         assert!((values(flags) / want - 1.0).abs() < 2e-3, "{flags}");
     }
+}
+
+fn size_of(folder: &Path, name: &str) -> [u32; 2] {
+    let bytes = std::fs::read(folder.join(name)).unwrap();
+    assert_eq!(&bytes[..8], b"\x89PNG\r\n\x1a\n", "{name}");
+    [16, 20].map(|at| u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()))
+}
+
+/// Every view of one picture, none of which renders again: solution and materials are gone.
+#[test]
+fn views_are_made_from_the_picture_alone() {
+    let folder = furnace();
+    let line = format!(
+        "render s.sol --mesh s.mesh -o s.exr --layers element,face,irradiance,error --interpolation linear {INSIDE}"
+    );
+    assert!(run(folder.path(), &line).status.success());
+    for name in ["s.sol", "s.materials"] {
+        std::fs::remove_file(folder.path().join(name)).unwrap();
+    }
+    for (view, wider, higher) in [
+        ("tone --exposure -1 --curve linear", false, false),
+        ("false-colour --quantity radiance", true, true),
+        ("false-colour --quantity illuminance --log --range 1,1000", true, true),
+        ("isolux --step 100", true, true),
+        ("mesh --mesh s.mesh", true, true),
+        ("error", true, true),
+    ] {
+        let (kind, flags) = view.split_once(' ').unwrap_or((view, ""));
+        let output = run(folder.path(), &format!("view {kind} s.exr -o v.png {flags}"));
+        assert!(
+            output.status.success() && output.stderr.is_empty() && output.stdout.is_empty(),
+            "{output:?}"
+        );
+        let [width, height] = size_of(folder.path(), "v.png");
+        assert_eq!((width > 24, height > 16), (wider, higher), "{view}: {width} x {height}");
+    }
+    let report = |name: &str| -> serde_json::Value {
+        serde_json::from_slice(&std::fs::read(folder.path().join(name)).unwrap()).unwrap()
+    };
+    let line = "view false-colour s.exr -o v.png --quantity irradiance --range 0,2";
+    assert!(run(folder.path(), line).status.success());
+    assert_eq!(report("v.png.report.json")["estimates"]["scale_high"], 2.0);
+    assert!(run(folder.path(), "view tone s.exr -o v.png --exposure 3").status.success());
+    assert_eq!(report("v.png.report.json")["estimates"]["exposure_stops"], 3.0);
+}
+
+#[test]
+fn views_say_what_a_picture_lacks() {
+    let folder = furnace();
+    assert!(run(folder.path(), &format!("render s.sol --mesh s.mesh -o s.exr {INSIDE}")).status.success());
+    let mut other = cube();
+    other.vertices[0][0] = -0.25;
+    other.write(&folder.path().join("o.mesh"), Provenance::new("mesh-tool", "test")).unwrap();
+    for (view, words) in [
+        ("view isolux s.exr -o v.png", "--layers irradiance"),
+        ("view isolux s.exr -o v.png --quantity luminance", "--layers face"),
+        ("view error s.exr -o v.png", "--layers element"),
+        ("view mesh s.exr --mesh o.mesh -o v.png", "another mesh"),
+        ("view tone s.sol -o v.png", "solve-tool info"),
+        ("sheet s.exr t.exr -o v.png", "t.exr"),
+    ] {
+        let (code, stderr) = failure(folder.path(), view);
+        assert!(code == Some(1) && stderr.contains(words) && stderr.lines().count() == 1, "{view}: {stderr}");
+    }
+    assert!(!folder.path().join("v.png").exists());
+}
+
+#[test]
+fn a_sheet_shows_all_with_the_exposure_of_the_last() {
+    let folder = furnace();
+    for (name, flags) in [("0", "--interpolation constant"), ("1", "--interpolation linear")] {
+        let line = format!("render s.sol --mesh s.mesh -o {name}.exr --png {name}.png {flags} {INSIDE}");
+        assert!(run(folder.path(), &line).status.success());
+    }
+    let line = "sheet 0.exr 1.exr 1.exr -o sheet.png --columns 2 --labels none,one,all";
+    assert!(run(folder.path(), line).status.success());
+    let [width, height] = size_of(folder.path(), "sheet.png");
+    assert!(width > 2 * 24 && height > 2 * 16, "{width} x {height}");
+    let report = std::fs::read_to_string(folder.path().join("sheet.png.report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    // Constant and interpolated furnaces are the same to halves.
+    assert!(report["estimates"]["relative_rms_0"].as_f64().unwrap() < 1e-3);
+    assert_eq!(report["estimates"]["relative_rms_1"], 0.0);
+    assert_eq!(report["counters"]["pictures"], 3);
 }
