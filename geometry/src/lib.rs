@@ -29,3 +29,4 @@ pub mod unoccluded;
 pub mod visible;
 pub mod visible_four;
 pub mod visible_part;
+pub mod visible_pieces;

@@ -7,9 +7,11 @@ use crate::facets::Drawn;
 use crate::frames::{Frame, frames};
 use crate::layers::Layer;
 use crate::lit_scene::LitScene;
+use crate::local_picture::LocalRenderer;
 use crate::picture::Picture;
 use crate::refined::Scheme;
 use crate::render::{Quality, Renderer};
+use crate::shading::ShadingArguments;
 use crate::sheet::SheetArguments;
 use crate::skips::Skip;
 use crate::tone::ToneArguments;
@@ -132,6 +134,9 @@ pub struct RenderArguments {
     /// Samples along each side of a pixel
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
     pub samples: u32,
+    /// Local models.
+    #[command(flatten)]
+    pub shading: ShadingArguments,
     /// How light is interpolated over elements
     #[arg(long, value_name = "HOW", default_value = "auto")]
     pub interpolation: Interpolation,
@@ -243,6 +248,9 @@ impl Arguments {
             let message = "--eye and --look-at must be given together, or with --camera";
             return Err(Arguments::command().error(ErrorKind::MissingRequiredArgument, message));
         }
+        if let Err(message) = render.shading.usage(&render.layers) {
+            return bad(ErrorKind::ArgumentConflict, message);
+        }
         let apart = render.layers.iter().find(|layer| layer.needs_gathering());
         if let (Some(layer), Interpolation::Constant) = (apart, render.interpolation) {
             let message =
@@ -265,9 +273,17 @@ impl Arguments {
     }
 }
 
+/// What makes the pictures of a run.
+enum Shader<'a> {
+    Solution(Box<Renderer<'a>>),
+    Local(Box<LocalRenderer<'a>>),
+}
+
 fn run_render(arguments: &RenderArguments, common: &Common) -> Result<()> {
     let mut report = Report::new(TOOL, VERSION);
-    let scheme = arguments.interpolation.scheme(arguments.tolerance);
+    let local = arguments.shading.local();
+    // Local models know elements only.
+    let scheme = arguments.interpolation.scheme(arguments.tolerance).filter(|_| local.is_none());
     let drawn = match scheme {
         None => Drawn::Elements,
         Some(Scheme::Linear) => Drawn::Facets,
@@ -277,11 +293,14 @@ fn run_render(arguments: &RenderArguments, common: &Common) -> Result<()> {
     let frames = cameras(arguments, &scene, &mut report)?;
     let precision = if arguments.float { Precision::Float } else { Precision::Half };
     let scheme_name = scheme.map_or("Constant".into(), |scheme| format!("{scheme:?}")).to_lowercase();
-    let provenance = Provenance::new(TOOL, VERSION)
-        .flag(format!("--samples {}", arguments.samples))
-        .flag(format!("--tolerance {}", arguments.tolerance))
-        .flag(format!("--interpolation {scheme_name}"))
-        .flag(if arguments.float { "--float" } else { "--half" });
+    let provenance = Provenance::new(TOOL, VERSION).flag(format!("--samples {}", arguments.samples));
+    let provenance = match &local {
+        Some(model) => model.sign(provenance),
+        None => provenance
+            .flag(format!("--tolerance {}", arguments.tolerance))
+            .flag(format!("--interpolation {scheme_name}")),
+    };
+    let provenance = provenance.flag(if arguments.float { "--float" } else { "--half" });
     let provenance = skips::sign(&arguments.scene.no_skip, provenance);
     let provenance = scene.sign(provenance);
     report.flags.clone_from(&provenance.flags);
@@ -293,9 +312,17 @@ fn run_render(arguments: &RenderArguments, common: &Common) -> Result<()> {
         layers: arguments.layers.clone(),
     };
     let opening = skips::opening(&arguments.scene.no_skip, Some(arguments.tolerance));
-    let mut renderer = Renderer::new(&scene, opening, &mut report);
+    let mut renderer = match local {
+        Some(model) => Shader::Local(Box::new(LocalRenderer::new(&scene, model, &mut report))),
+        None => Shader::Solution(Box::new(Renderer::new(&scene, opening, &mut report))),
+    };
     for frame in &frames {
-        let picture = renderer.render(&frame.camera, &quality, common, &mut report);
+        let picture = match &mut renderer {
+            Shader::Solution(renderer) => renderer.render(&frame.camera, &quality, common, &mut report),
+            Shader::Local(renderer) => {
+                renderer.render(&frame.camera, quality.samples, &quality.layers, common, &mut report)
+            }
+        };
         warn_of_range(&picture, precision, &mut report);
         let provenance = provenance.clone().flag(format!("camera {}", frame.camera.describe()));
         report.flags.push(format!("camera {}", frame.camera.describe()));
@@ -303,10 +330,13 @@ fn run_render(arguments: &RenderArguments, common: &Common) -> Result<()> {
             provenance: &provenance,
             camera: Some(&frame.camera),
             efficacy: arguments.efficacy,
-            remarks: format!(
-                "; {scheme_name} interpolation to {} of radiosity on a solution to {:.1e} of the emitted power",
-                arguments.tolerance, scene.achieved
-            ),
+            remarks: match &local {
+                Some(model) => format!("; {} shading, direct light only", model.name()),
+                None => format!(
+                    "; {scheme_name} interpolation to {} of radiosity on a solution to {:.1e} of the emitted power",
+                    arguments.tolerance, scene.achieved
+                ),
+            },
         };
         let path = frame.path(&arguments.output);
         report.phase("write", || exr_file::write(&path, &picture, precision, &label))?;
@@ -316,7 +346,9 @@ fn run_render(arguments: &RenderArguments, common: &Common) -> Result<()> {
             report.phase("preview", || tone.shown(&picture).write(&frame.path(png)))?;
         }
     }
-    renderer.count(&mut report);
+    if let Shader::Solution(renderer) = &renderer {
+        renderer.count(&mut report);
+    }
     report.write_beside(&arguments.output)?;
     Ok(())
 }

@@ -110,9 +110,9 @@ fn triples(channels: &BTreeMap<String, FlatSamples>, names: [String; 3]) -> Opti
 
 fn values(layer: Layer, channels: &BTreeMap<String, FlatSamples>) -> Option<Values> {
     let name = |channel: &str| format!("{}.{channel}", layer.name());
-    match layer.channels() {
-        &[a, b, c] => triples(channels, [a, b, c].map(name)).map(Values::Triples),
-        &[channel] => Some(match channels.get(&name(channel))? {
+    match *layer.channels() {
+        [a, b, c] => triples(channels, [a, b, c].map(name)).map(Values::Triples),
+        [channel] => Some(match channels.get(&name(channel))? {
             FlatSamples::U32(indices) => Values::Indices(indices.clone()),
             samples => Values::Numbers(numbers(samples)),
         }),

@@ -9,8 +9,13 @@
 //! side; both draw on a [`canvas`] with letters of [`font`]. [`probe`] gathers irradiance at the points of a
 //! table or of a grid ([`grid`]). [`info`] tells what a picture holds. [`skips`] names what is left out.
 //!
+//! Besides the solution there are the models of direct light that came before it ([`shading`], [`local_picture`]): emitters as
+//! exactly visible polygons ([`direct_light`]), highlights of [`phong`] and [`cook_torrance`] with [`fresnel`]'s law,
+//! integrated over those polygons ([`gloss`]).
+//!
 //! # Limitations
-//! Surfaces are seen as Lambertian: specular and transparent parts of a material do not show.
+//! In pictures of a solution surfaces are Lambertian: specular and transparent parts of a material do not show. Highlights
+//! are of direct light only, and mirrors show nothing but emitters.
 
 #![forbid(unsafe_code)]
 
@@ -21,6 +26,8 @@ pub mod colour_scale;
 pub mod command_line;
 pub mod contours;
 pub mod convex;
+pub mod cook_torrance;
+pub mod direct_light;
 pub mod element_error;
 pub mod error;
 pub mod exr_file;
@@ -29,16 +36,20 @@ pub mod face_elements;
 pub mod facets;
 pub mod font;
 pub mod frames;
+pub mod fresnel;
+pub mod gloss;
 pub mod grid;
 pub mod info;
 pub mod interpolation;
 pub mod isolux;
 pub mod layers;
 pub mod lit_scene;
+pub mod local_picture;
 pub mod mesh_overlay;
 pub mod node_places;
 pub mod nodes;
 pub mod on_surface;
+pub mod phong;
 pub mod picture;
 pub mod points;
 pub mod probe;
@@ -46,6 +57,7 @@ pub mod quantity;
 pub mod receiver;
 pub mod refined;
 pub mod render;
+pub mod shading;
 pub mod sheet;
 pub mod skips;
 pub mod tone;

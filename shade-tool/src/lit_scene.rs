@@ -57,8 +57,8 @@ impl LitScene {
         let (materials, materials_digest) = load_materials(mesh_path, materials_path, &mesh.materials)?;
         if materials_digest != origins.materials {
             report.warn(format!(
-                "{}: not the materials that {} was solved with: surfaces show these, the light that reaches them is the \
-                 old one; run solve-tool solve",
+                "{}: not the materials that {} was solved with: surfaces show these, the solution is that of the \
+                 old ones; run solve-tool solve",
                 materials_path.unwrap_or(&table_beside(mesh_path)).display(),
                 solution_path.display()
             ));

@@ -219,7 +219,7 @@ fn samples_of_row<'a>(
 /// so many times finer (as Kensler 2013, "Correlated Multi-Jittered Sampling", before jitter). So an edge along rows or
 /// columns, as most edges of rooms are, is covered in n^2 steps instead of n. His arrangement has n samples on the
 /// pixel's diagonal, where edges of rooms seen straight run; counting one axis backwards leaves it free.
-fn place_in_pixel(k: usize, samples: usize) -> [f64; 2] {
+pub(crate) fn place_in_pixel(k: usize, samples: usize) -> [f64; 2] {
     let n = samples as f64;
     let (column, row) = ((k % samples) as f64, (k / samples) as f64);
     [(column + (row + 0.5) / n) / n, (row + (n - column - 0.5) / n) / n]

@@ -242,6 +242,11 @@ fn bad_usage_ends_with_2() {
         "--layers bounces",
         "--interpolation cubic",
         "--interpolation constant --layers direct",
+        "--shading whitted",
+        "--shading phong --layers indirect",
+        "--shading phong --phong blinn",
+        "--shading cook-torrance --phong 1975",
+        "--no-shadows",
         "--no-skip everything",
         "--orthographic 0",
         "--orthographic 1 --fov-deg 30",
@@ -469,4 +474,54 @@ fn a_sheet_shows_all_with_the_exposure_of_the_last() {
     assert!(report["estimates"]["relative_rms_0"].as_f64().unwrap() < 1e-3);
     assert_eq!(report["estimates"]["relative_rms_1"], 0.0);
     assert_eq!(report["counters"]["pictures"], 3);
+}
+
+/// A closed room in which only the ceiling emits, B of 1, 2 and 4: direct light on the middle of the floor is the known
+/// factor of two facing squares' sides, and the walls' own light is nowhere.
+#[test]
+fn local_models_know_direct_light_only() {
+    let folder = furnace();
+    let camera =
+        "--eye 0.5,0.5,0.5 --look-at 0.5,0,0.5 --up 0,0,1 --orthographic 0.01 --size 3x3 --samples 2 --float";
+    for shading in ["flat", "phong", "phong --phong 1975", "cook-torrance", "cook-torrance --no-shadows"] {
+        let line = format!(
+            "render s.sol --mesh s.mesh -o s.exr --png s.png --shading {shading} --layers irradiance,element {camera}"
+        );
+        let output = run(folder.path(), &line);
+        assert!(output.status.success(), "{output:?}");
+        let told = run(folder.path(), "info s.exr --json");
+        let told: serde_json::Value = serde_json::from_slice(&told.stdout).unwrap();
+        let channels = told["layers"][0]["channels"].as_array().unwrap().clone();
+        let mean = |name: &str| {
+            channels.iter().find(|c| c["name"] == name).and_then(|c| c["mean"].as_f64()).unwrap()
+        };
+        // A square of side 1 seen from 1 below its middle: 4 / pi h atan h with h = 0.5 / sqrt(1.25).
+        let h = 0.5 / 1.25f64.sqrt();
+        let factor = 4.0 / std::f64::consts::PI * h * h.atan();
+        for (name, b) in [("irradiance.R", 1.0), ("irradiance.B", 4.0)] {
+            let error = mean(name) / (b * factor) - 1.0;
+            assert!(error.abs() < 1e-4, "{shading} {name}: {error}");
+        }
+        // Kd is 1 and nothing has Ks.
+        assert!((mean("G") * std::f64::consts::PI / (2.0 * factor) - 1.0).abs() < 1e-4, "{shading}");
+        let provenance = told["attributes"]["provenance"].as_str().unwrap().to_owned();
+        assert!(provenance.contains("--shading") && !provenance.contains("--interpolation"), "{provenance}");
+    }
+    let report = std::fs::read_to_string(folder.path().join("s.exr.report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    assert_eq!(report["counters"]["emitting_polygons"], 1);
+    assert!(report["warnings"][0].as_str().unwrap().contains("no material has Ks"));
+}
+
+#[test]
+fn local_models_give_the_same_bytes_for_any_number_of_threads() {
+    let folder = furnace();
+    for (name, threads) in [("one", 1), ("three", 3)] {
+        let line = format!(
+            "render s.sol --mesh s.mesh -o {name}.exr --shading cook-torrance --threads {threads} {INSIDE}"
+        );
+        assert!(run(folder.path(), &line).status.success());
+    }
+    let bytes = |name: &str| std::fs::read(folder.path().join(name)).unwrap();
+    assert_eq!(bytes("one.exr"), bytes("three.exr"));
 }
