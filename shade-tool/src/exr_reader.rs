@@ -43,7 +43,9 @@ impl StoredPicture {
             let channels: &exr::prelude::AnyChannels<FlatSamples> = &layer.channel_data;
             let name =
                 |c: &exr::prelude::AnyChannel<_>| String::from_utf8_lossy(c.name.as_slice()).into_owned();
-            channels.list.iter().map(|c| (name(c), c.sample_data.clone())).collect()
+            // Channels with fewer samples than pixels are of no use here.
+            let full = channels.list.iter().filter(|c| c.sample_data.len() == layer.size.0 * layer.size.1);
+            full.map(|c| (name(c), c.sample_data.clone())).collect()
         };
         let found = image.layer_data.iter().find_map(|layer| {
             let channels = named(layer);

@@ -23,7 +23,7 @@ pub enum Quantity {
 pub struct Map {
     /// Width in pixels.
     pub width: usize,
-    /// One value per pixel, not a number where nothing is seen.
+    /// One value per pixel, not a number where nothing is seen or known.
     pub values: Vec<f64>,
     /// What they are, with the unit.
     pub caption: String,
@@ -49,8 +49,13 @@ impl Quantity {
         // Background is known where an index was stored.
         let seen = picture.layer(Layer::Face).or_else(|| picture.layer(Layer::Element));
         let is_nothing = |k: usize| matches!(seen, Some(Values::Indices(seen)) if seen[k] == NOTHING);
+        // A lamp that reflects nothing shines without irradiance having been asked for: 0 stands for unknown there.
+        let is_unknown = |k: usize, rgb: [f64; 3]| {
+            let of_surface = matches!(self, Quantity::Illuminance | Quantity::Irradiance);
+            of_surface && rgb == [0.0; 3] && picture.pixels[k] != [0.0; 3]
+        };
         let value = |(k, &rgb): (usize, &[f64; 3])| {
-            if is_nothing(k) { f64::NAN } else { factor * luminance(rgb) }
+            if is_nothing(k) || is_unknown(k, rgb) { f64::NAN } else { factor * luminance(rgb) }
         };
         let values = source.iter().enumerate().map(value).collect();
         Ok(Map { width: picture.width, values, caption })
@@ -63,6 +68,15 @@ mod tests {
     use super::*;
     use crate::picture::Picture;
     use crate::test_scenes::stored;
+
+    #[test]
+    fn irradiance_of_lamps_is_unknown_and_that_of_shadows_is_none() {
+        let layers = vec![(Layer::Irradiance, Values::Triples(vec![[0.0; 3]; 2]))];
+        let picture = Picture { width: 2, height: 1, pixels: vec![[17.0, 12.0, 4.0], [0.0; 3]], layers };
+        let map = Quantity::Irradiance.map(&stored(&picture), 1.0).unwrap();
+        assert!(map.values[0].is_nan() && map.values[1] == 0.0, "{:?}", map.values);
+        assert!(Quantity::Radiance.map(&stored(&picture), 1.0).unwrap().values[0] > 10.0);
+    }
 
     #[test]
     fn quantities_are_weighted_scaled_and_left_out_where_nothing_is() {
