@@ -226,4 +226,53 @@ mod tests {
         assert!((half - above_horizon(DVec3::ZERO, DVec3::X, &right)).abs() < 1e-15);
         assert_eq!(factor(&open, DVec3::new(0.0, 0.0, 5.0), DVec3::NEG_Z), 0.0);
     }
+
+    /// SplitMix64 (Steele, Lea & Flood 2014): seeded numbers in [0, 1).
+    struct Random(u64);
+    impl Random {
+        fn next(&mut self) -> f64 {
+            self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+            let mut z = self.0;
+            z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        }
+        fn point(&mut self) -> DVec3 {
+            DVec3::new(self.next(), self.next(), self.next())
+        }
+    }
+
+    /// In clutter the pieces of every source add up to what the gatherer, which cuts in another order and culls by other
+    /// tests, gives as its factor.
+    #[test]
+    fn pieces_agree_with_the_gatherer_in_clutter() {
+        let mut random = Random(7);
+        let parallelogram = |random: &mut Random, size: f64| {
+            let (corner, u, v) = (random.point(), random.point() - 0.5, random.point() - 0.5);
+            vec![corner, corner + size * u, corner + size * (u + v), corner + size * v]
+        };
+        let sources: Vec<Vec<DVec3>> = (0..12).map(|_| parallelogram(&mut random, 0.6)).collect();
+        let clutter: Vec<Vec<DVec3>> = (0..40).map(|_| parallelogram(&mut random, 0.5)).collect();
+        let blockers = |all: &[Vec<DVec3>]| all.iter().cloned().filter_map(Occluder::new).collect::<Vec<_>>();
+        let all: Vec<Vec<DVec3>> = sources.iter().chain(&clutter).cloned().collect();
+        let view = VisiblePieces::new(sources.clone(), blockers(&all));
+        let gatherer = crate::gather::Gatherer::new(blockers(&all), sources.clone());
+        let mut memory = (Scratch::default(), crate::gather::Scratch::default());
+        let mut partly = 0;
+        for _ in 0..200 {
+            let (point, normal) = (random.point(), (random.point() - 0.5).normalize_or(DVec3::Z));
+            let (mut got, mut want) = ([0.0; 12], [0.0; 12]);
+            view.visit(point, normal, &mut memory.0, |source, piece| {
+                got[source] += above_horizon(DVec3::ZERO, normal, piece);
+            });
+            gatherer.factors(point, normal, &mut memory.1, &mut |source, factor| want[source] = factor);
+            for (source, (got, want)) in got.iter().zip(want).enumerate() {
+                let whole =
+                    crate::point_factor::point_factor(point, normal, &sources[source], &mut Vec::new());
+                partly += usize::from(want > 1e-6 && want < 0.99 * whole);
+                assert!((got - want).abs() < 1e-12, "{source} from {point}: {got}, want {want}");
+            }
+        }
+        assert!(partly > 100, "{partly} partly seen sources are a test");
+    }
 }

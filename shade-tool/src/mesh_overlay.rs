@@ -18,7 +18,7 @@ const EDGE_WIDTH: f64 = 0.6;
 /// Colours of lines by order, and what is discontinuous there.
 const ORDERS: [([u8; 3], &str); 3] =
     [([255, 50, 60], "D0 value"), ([255, 170, 0], "D1 slope"), ([60, 190, 255], "D2 curvature")];
-/// Lines are cut into so many pieces: a panorama bends them, and what lies behind the eye is left out piece by piece.
+/// Lines that a panorama bends, or that pass the eye, are cut into so many pieces.
 const PIECES: u32 = 32;
 /// Halvings that find where a line passes the eye: to 1e-9 of a piece.
 const HALVINGS: usize = 30;
@@ -91,8 +91,11 @@ fn draw(
         (-1..=1).any(|dy| (-1..=1).any(|dx| at(x + dx, y + dy).is_some_and(&on)))
     };
     let place = |t: f64| camera.place_of(from.lerp(to, t)).map(|(place, _)| place);
-    for k in 0..PIECES {
-        let [start, end] = [k, k + 1].map(|k| f64::from(k) / f64::from(PIECES));
+    // What is straight and wholly before the eye needs no pieces, whose ends would cover pixels twice.
+    let straight = !camera.wraps() && place(0.0).is_some() && place(1.0).is_some();
+    let pieces = if straight { 1 } else { PIECES };
+    for k in 0..pieces {
+        let [start, end] = [k, k + 1].map(|k| f64::from(k) / f64::from(pieces));
         let piece = match (place(start), place(end)) {
             (Some(a), Some(b)) => Some([a, b]),
             (Some(a), None) => place(last_before(start, end, place)).map(|b| [a, b]),

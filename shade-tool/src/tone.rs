@@ -25,7 +25,7 @@ const TOO_DARK: f64 = 1e-4;
 /// Exposures beyond 2^100 and 2^-100 are slips of the pen.
 const MOST_STOPS: f64 = 100.0;
 /// Solution of f(KEY x) = KEY for the fit f that [`Curve::Filmic`] uses.
-const FILMIC_SCALE: f64 = 0.723_195;
+const FILMIC_SCALE: f64 = 0.723_170_8;
 
 /// How bright.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,6 +63,20 @@ pub enum Curve {
     Filmic,
     /// As it is, cut at white
     Linear,
+}
+
+impl Curve {
+    /// Brightness of an exposed radiance, not yet cut at 1; `white` is what `reinhard` makes white.
+    fn value(self, x: f64, white: f64) -> f64 {
+        match self {
+            Curve::Reinhard => x * (1.0 + x / (white * white)) / (1.0 + x),
+            Curve::Filmic => {
+                let x = FILMIC_SCALE * x;
+                x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)
+            }
+            Curve::Linear => x,
+        }
+    }
 }
 
 /// Flags of everything that shows radiance.
@@ -116,16 +130,8 @@ impl Tone {
 
     /// A radiance as it appears on a screen.
     pub fn displayed(&self, radiance: [f64; 3]) -> [u8; 3] {
-        let curve = |x: f64| match self.curve {
-            Curve::Reinhard => x * (1.0 + x / (self.white * self.white)) / (1.0 + x),
-            Curve::Filmic => {
-                let x = FILMIC_SCALE * x;
-                x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14)
-            }
-            Curve::Linear => x,
-        };
         radiance.map(|x| match self.factor * x {
-            x if x.is_finite() => (255.0 * srgb(curve(x).clamp(0.0, 1.0)) + 0.5) as u8,
+            x if x.is_finite() => (255.0 * srgb(self.curve.value(x, self.white).clamp(0.0, 1.0)) + 0.5) as u8,
             x if x > 0.0 => 255,
             _ => 0,
         })
@@ -224,6 +230,14 @@ mod tests {
             shown(&grey(&[f64::INFINITY, f64::NAN, 1.0]), "0", Curve::Filmic)[..2],
             [[255; 3], [0; 3]]
         );
+    }
+
+    #[test]
+    fn middle_grey_stays_on_every_curve() {
+        for curve in CURVES {
+            // Reinhard's is the identity where 1 is white.
+            assert!((curve.value(KEY, 1.0) - KEY).abs() < 1e-7, "{curve:?}: {}", curve.value(KEY, 1.0));
+        }
     }
 
     #[test]

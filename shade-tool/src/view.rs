@@ -22,6 +22,8 @@ use std::path::PathBuf;
 const EFFICACY: f64 = 179.0;
 /// Contours to a scale's length, at least, where no step is given.
 const CONTOURS: usize = 8;
+/// Without a step contours go on to so many times the scale's end: beyond it are lamps.
+const BEYOND_SCALE: f64 = 4.0;
 /// More contours than this are no picture.
 const MOST_CONTOURS: f64 = 1000.0;
 
@@ -66,6 +68,9 @@ pub struct ToneView {
     /// Picture and view.
     #[command(flatten)]
     pub files: Files,
+    /// Show a layer of colours instead of radiance
+    #[arg(long, value_name = "NAME", value_parser = layer_of_colours)]
+    pub layer: Option<Layer>,
     /// Exposure and curve.
     #[command(flatten)]
     pub tone: ToneArguments,
@@ -170,7 +175,15 @@ impl View {
         let files = self.files();
         let stored = StoredPicture::read(&files.picture)?;
         let canvas = match self {
-            View::Tone(view) => shown(&stored, &view.tone, &mut report),
+            View::Tone(view) => {
+                let mut stored = stored.clone();
+                if let Some(layer) = view.layer
+                    && let Values::Triples(colours) = stored.layer(layer)?.clone()
+                {
+                    stored.picture.pixels = colours;
+                }
+                shown(&stored, &view.tone, &mut report)
+            }
             View::FalseColour(view) => {
                 let map = view.quantity.map(&stored, efficacy(view.efficacy, &stored))?;
                 false_colour(&map, &view.scale, &mut report)
@@ -211,9 +224,12 @@ impl IsoluxView {
         levels.sort_by(f64::total_cmp);
         levels.dedup();
         let caption = if levels.is_empty() {
-            let highest = map.values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
-            let by_itself = || round_step(Scale::fitting(&map.values, false).high, CONTOURS);
-            let step = self.step.unwrap_or_else(by_itself);
+            let mut highest = map.values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
+            let step = self.step.unwrap_or_else(|| {
+                let end = Scale::fitting(&map.values, false).high;
+                highest = highest.min(BEYOND_SCALE * end);
+                round_step(end, CONTOURS)
+            });
             if highest / step > MOST_CONTOURS {
                 let found =
                     format!("{} contours of {} up to {highest}", (highest / step).round(), label(step));
@@ -275,6 +291,15 @@ fn false_colour(map: &Map, asked: &ScaleArguments, report: &mut Report) -> Canva
     let beyond = map.values.iter().any(|&v| v > scale.high);
     let picture = coloured(&map.values, map.width, &scale);
     captioned(&with_bar(&picture, &scale, beyond), &map.caption)
+}
+
+fn layer_of_colours(text: &str) -> Result<Layer, String> {
+    let colours = [Layer::Albedo, Layer::Irradiance, Layer::Direct, Layer::Indirect];
+    let names = || colours.map(Layer::name).join(", ");
+    colours
+        .into_iter()
+        .find(|layer| layer.name() == text)
+        .ok_or_else(|| format!("expected one of {}", names()))
 }
 
 fn range(text: &str) -> Result<[f64; 2], String> {

@@ -291,6 +291,7 @@ fn bad_usage_ends_with_2() {
         "view false-colour s.exr -o v.png --range 5,1",
         "view false-colour s.exr -o v.png --range 0,1 --log",
         "view isolux s.exr -o v.png --step 0",
+        "view tone s.exr -o v.png --layer depth",
         "view isolux s.exr -o v.png --step 1 --levels 1,2",
         "sheet -o v.png",
         "sheet a.exr b.exr -o v.png --labels one",
@@ -411,6 +412,7 @@ fn views_are_made_from_the_picture_alone() {
     }
     for (view, wider, higher) in [
         ("tone --exposure -1 --curve linear", false, false),
+        ("tone --layer irradiance --curve filmic", false, false),
         ("false-colour --quantity radiance", true, true),
         ("false-colour --quantity illuminance --log --range 1,1000", true, true),
         ("isolux --step 100", true, true),
@@ -434,6 +436,22 @@ fn views_are_made_from_the_picture_alone() {
     assert_eq!(report("v.png.report.json")["estimates"]["scale_high"], 2.0);
     assert!(run(folder.path(), "view tone s.exr -o v.png --exposure 3").status.success());
     assert_eq!(report("v.png.report.json")["estimates"]["exposure_stops"], 3.0);
+    let pixel = |line: &str| {
+        assert!(run(folder.path(), line).status.success());
+        let file = std::io::BufReader::new(std::fs::File::open(folder.path().join("v.png")).unwrap());
+        let mut reader = png::Decoder::new(file).read_info().unwrap();
+        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut bytes).unwrap();
+        [bytes[0], bytes[1], bytes[2]]
+    };
+    let bright = pixel("view tone s.exr -o v.png --curve linear --exposure -2");
+    let dim = pixel("view tone s.exr -o v.png --curve linear --exposure -3");
+    // Radiance 1, 2 and 4 over pi at 2^-2: 0.0796, 0.159 and 0.318 are 79, 112 and 153 in sRGB.
+    assert_eq!(bright, [80, 111, 153]);
+    assert_eq!(dim[1..], bright[..2]);
+    // Irradiance 1, 2 and 4 at 2^-3: 0.125, 0.25 and 0.5 are 99, 137 and 188.
+    let layer = pixel("view tone s.exr -o v.png --layer irradiance --curve linear --exposure -3");
+    assert_eq!(layer, [99, 137, 188]);
 }
 
 #[test]
