@@ -11,6 +11,8 @@ use crate::quantity::Map;
 const CONTOUR: [u8; 3] = [255, 225, 60];
 /// Every so manieth contour is drawn thicker, as on maps.
 const THICK_EVERY: usize = 5;
+/// Where contours would lie closer than this, in widths of their line, only every fifth is drawn, or every twenty-fifth.
+const CLOSEST: f64 = 3.0;
 /// Contours shorter than this, in letters of their label's height, are noise of the interpolation and are not drawn.
 const SHORTEST: f64 = 1.0;
 /// A contour is labelled where it is so many labels long, and again after so many.
@@ -25,8 +27,9 @@ struct Place {
     y: i64,
 }
 
-/// Draws the contours of these levels over a picture. `faces` are numbers of the faces that pixels see.
-pub fn isolux(background: &Canvas, map: &Map, faces: &[u32], levels: &[f64]) -> Canvas {
+/// Draws the contours of these levels over a picture; even steps are thinned where they would touch. `faces` are
+/// numbers of the faces that pixels see.
+pub fn isolux(background: &Canvas, map: &Map, faces: &[u32], levels: &[f64], even: bool) -> Canvas {
     let mut canvas = background.clone();
     let scale = text_scale(canvas.height);
     let values = &map.values;
@@ -36,7 +39,17 @@ pub fn isolux(background: &Canvas, map: &Map, faces: &[u32], levels: &[f64]) -> 
         .iter()
         .enumerate()
         .map(|(k, &level)| {
-            let mut lines = contours(values, map.width, level, together);
+            let lines = contours(values, map.width, level, together);
+            let step = if even { distance_to_next(levels, k) } else { f64::INFINITY };
+            let drawn = |place: [f64; 2]| {
+                let spacing = step / steepness(map, place);
+                let mut every = 1;
+                while spacing * (every as f64) < CLOSEST * scale as f64 && every < THICK_EVERY.pow(3) {
+                    every *= THICK_EVERY;
+                }
+                (k + 1) % every == 0
+            };
+            let mut lines: Vec<Contour> = lines.iter().flat_map(|line| parts(line, drawn)).collect();
             lines.retain(|line| length(line) >= SHORTEST * text_height(scale) as f64);
             (k, lines)
         })
@@ -63,6 +76,36 @@ pub fn isolux(background: &Canvas, map: &Map, faces: &[u32], levels: &[f64]) -> 
         canvas.text(text, x - text_width(text, scale) / 2, y - 3 * scale, scale);
     }
     canvas
+}
+
+/// From a level to the next one, or for the last from the one before; for a single one without end.
+fn distance_to_next(levels: &[f64], k: usize) -> f64 {
+    let pair = if k + 1 < levels.len() { levels.get(k..k + 2) } else { levels.get(k.wrapping_sub(1)..k + 1) };
+    pair.map_or(f64::INFINITY, |pair| pair[1] - pair[0])
+}
+
+/// How much the map changes from pixel to pixel at a place.
+fn steepness(map: &Map, [x, y]: [f64; 2]) -> f64 {
+    let height = map.values.len() / map.width.max(1);
+    let cell = |v: f64, size: usize| ((v - 0.5).max(0.0) as usize).min(size.saturating_sub(2));
+    let k = cell(y, height) * map.width + cell(x, map.width);
+    let at = |k: usize| map.values.get(k).copied().unwrap_or(f64::NAN);
+    let [a, b, c, d] = [k, k + 1, k + map.width, k + map.width + 1].map(at);
+    let slope = (0.5 * (b + d - a - c)).hypot(0.5 * (c + d - a - b));
+    if slope.is_finite() { slope } else { 0.0 }
+}
+
+/// The parts of a line whose places are drawn.
+fn parts(line: &Contour, drawn: impl Fn([f64; 2]) -> bool) -> Vec<Contour> {
+    let mut parts = vec![Vec::new()];
+    for &place in line {
+        match (drawn(place), parts.last_mut()) {
+            (true, Some(part)) => part.push(place),
+            _ => parts.push(Vec::new()),
+        }
+    }
+    parts.retain(|part: &Contour| part.len() > 1);
+    parts
 }
 
 /// Pixels whose four neighbours see the same face: those at a border are mixtures of two.
@@ -127,11 +170,29 @@ mod tests {
         let faces: Vec<u32> = (0..width * height).map(|k| u32::from(k % width >= 40)).collect();
         let map = Map { width, values, caption: "x".into() };
         let ground = Canvas::new(width, height, [10; 3]);
-        let drawn = isolux(&ground, &map, &faces, &[1.0, 3.0, 8.5, 14.0]);
+        let drawn = isolux(&ground, &map, &faces, &[1.0, 3.0, 8.5, 14.0], false);
         let row = &drawn.pixels[2 * width..3 * width];
         let yellow: Vec<usize> = (0..width).filter(|&x| row[x][0] > 120).collect();
         // 1 at x = 8, 3 at 24, 14 at 56; 8.5 lies in the jump at 40. Contours of 1 pixel share two there.
         assert!(yellow.iter().all(|x| [7, 8, 23, 24, 55, 56].contains(x)) && yellow.len() == 6, "{yellow:?}");
+    }
+
+    /// Values that grow a hundred times faster on the right half: there only few contours are left, on the left all.
+    #[test]
+    fn contours_are_thinned_where_they_would_touch() {
+        let (width, height) = (120, 40);
+        let value = |x: usize| if x < 60 { x as f64 / 10.0 } else { 6.0 + (x - 60) as f64 * 10.0 };
+        let values = (0..width * height).map(|k| value(k % width)).collect();
+        let map = Map { width, values, caption: "x".into() };
+        let levels: Vec<f64> = (1..600).map(|k| f64::from(k) - 0.55).collect();
+        let drawn =
+            isolux(&Canvas::new(width, height, [10; 3]), &map, &vec![0; width * height], &levels, true);
+        let yellow = |columns: std::ops::Range<usize>| {
+            columns.filter(|&x| drawn.pixels[2 * width + x][0] > 120).count()
+        };
+        assert!(yellow(0..58) >= 5, "{}", yellow(0..58));
+        // Ten contours a pixel: every 125th is drawn, four in sixty pixels, thick.
+        assert!((4..=16).contains(&yellow(62..120)), "{}", yellow(62..120));
     }
 
     #[test]

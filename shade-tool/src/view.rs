@@ -116,7 +116,8 @@ pub struct IsoluxView {
     /// Lumens per watt, for cd/m² and lx (default: what the picture was rendered with, else 179, equal-energy white)
     #[arg(long, value_name = "LM/W", value_parser = positive)]
     pub efficacy: Option<f64>,
-    /// Distance of the contours, in the quantity's unit (default: a round one that gives about ten)
+    /// Distance of the contours, in the quantity's unit (default: a round one that gives about ten); where they would touch
+    /// only every fifth is drawn
     #[arg(long, value_name = "S", value_parser = positive, conflicts_with = "levels")]
     pub step: Option<f64>,
     /// Values of the contours, instead of even steps
@@ -220,10 +221,11 @@ impl IsoluxView {
         let Values::Indices(faces) = stored.layer(Layer::Face)? else {
             return Err(Error::view(&stored.path, "layer face holds no indices", "render it again"));
         };
+        let even = self.levels.is_empty();
         let mut levels = self.levels.clone();
         levels.sort_by(f64::total_cmp);
         levels.dedup();
-        let caption = if levels.is_empty() {
+        let caption = if even {
             let mut highest = map.values.iter().copied().filter(|v| v.is_finite()).fold(0.0, f64::max);
             let step = self.step.unwrap_or_else(|| {
                 let end = Scale::fitting(&map.values, false).high;
@@ -241,7 +243,7 @@ impl IsoluxView {
         } else {
             map.caption.clone()
         };
-        Ok(captioned(&isolux(&shown(stored, &self.tone, report), &map, faces, &levels), &caption))
+        Ok(captioned(&isolux(&shown(stored, &self.tone, report), &map, faces, &levels, even), &caption))
     }
 }
 
