@@ -85,6 +85,7 @@ mod tests {
                 (Layer::Element, Values::Indices(vec![1, 1, NOTHING, 0])),
                 (Layer::Error, Values::Numbers(vec![0.01, 0.04, 9.0, 0.0])),
             ],
+            ..Picture::default()
         })
     }
 

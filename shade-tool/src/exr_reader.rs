@@ -57,7 +57,14 @@ impl StoredPicture {
         };
         let layers =
             Layer::value_variants().iter().filter_map(|&kind| Some((kind, values(kind, &channels)?)));
-        let picture = Picture { width: layer.size.0, height: layer.size.1, pixels, layers: layers.collect() };
+        let bounce = |k: usize| triples(&channels, ["R", "G", "B"].map(|c| format!("bounces.{k}.{c}")));
+        let picture = Picture {
+            width: layer.size.0,
+            height: layer.size.1,
+            pixels,
+            layers: layers.collect(),
+            bounces: (0..).map_while(bounce).collect(),
+        };
         let told = layer.attributes.other.iter().find(|(name, _)| name.as_slice() == PROVENANCE.as_bytes());
         let told: Value = match told {
             Some((_, AttributeValue::Text(json))) => {
@@ -181,8 +188,13 @@ mod tests {
             (Layer::Face, Values::Indices(vec![7, u32::MAX])),
             (Layer::Irradiance, Values::Triples(vec![[0.5, 0.25, 2.0]; 2])),
         ];
-        let picture =
-            Picture { width: 2, height: 1, pixels: vec![[1.0, 0.5, 0.25], [0.0, 4.0, 8.0]], layers };
+        let picture = Picture {
+            width: 2,
+            height: 1,
+            pixels: vec![[1.0, 0.5, 0.25], [0.0, 4.0, 8.0]],
+            layers,
+            bounces: vec![vec![[0.5; 3]; 2], vec![[0.25; 3]; 2]],
+        };
         let camera = Camera::new(DVec3::ZERO, DVec3::Z, DVec3::Y, Lens::Vertical(90.0), [2, 1]).unwrap();
         let provenance = Provenance::new("shade-tool", "9")
             .flag("--samples 2")

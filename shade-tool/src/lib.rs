@@ -19,6 +19,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod bounces;
 pub mod camera;
 pub mod canvas;
 pub mod coarser;
@@ -42,6 +43,7 @@ pub mod grid;
 pub mod info;
 pub mod interpolation;
 pub mod isolux;
+pub mod joined;
 pub mod layers;
 pub mod lit_scene;
 pub mod local_picture;

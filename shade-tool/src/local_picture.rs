@@ -104,6 +104,7 @@ impl<'a> LocalRenderer<'a> {
             height,
             pixels: pixels.iter().map(|pixel| pixel.radiance).collect(),
             layers: layers.into_iter().map(|layer| (layer, layer.of(&pixels))).collect(),
+            bounces: Vec::new(),
         };
         report.count("samples", width * height * samples * samples);
         for (channel, mean) in ["r", "g", "b"].iter().zip(picture.mean()) {

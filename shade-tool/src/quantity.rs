@@ -72,7 +72,13 @@ mod tests {
     #[test]
     fn irradiance_of_lamps_is_unknown_and_that_of_shadows_is_none() {
         let layers = vec![(Layer::Irradiance, Values::Triples(vec![[0.0; 3]; 2]))];
-        let picture = Picture { width: 2, height: 1, pixels: vec![[17.0, 12.0, 4.0], [0.0; 3]], layers };
+        let picture = Picture {
+            width: 2,
+            height: 1,
+            pixels: vec![[17.0, 12.0, 4.0], [0.0; 3]],
+            layers,
+            ..Picture::default()
+        };
         let map = Quantity::Irradiance.map(&stored(&picture), 1.0).unwrap();
         assert!(map.values[0].is_nan() && map.values[1] == 0.0, "{:?}", map.values);
         assert!(Quantity::Radiance.map(&stored(&picture), 1.0).unwrap().values[0] > 10.0);
@@ -84,7 +90,13 @@ mod tests {
             (Layer::Face, Values::Indices(vec![3, NOTHING])),
             (Layer::Irradiance, Values::Triples(vec![[1.0, 1.0, 1.0], [0.0; 3]])),
         ];
-        let picture = Picture { width: 2, height: 1, pixels: vec![[0.0, 1.0, 0.0], [1.0; 3]], layers };
+        let picture = Picture {
+            width: 2,
+            height: 1,
+            pixels: vec![[0.0, 1.0, 0.0], [1.0; 3]],
+            layers,
+            ..Picture::default()
+        };
         let whole = stored(&picture);
         for (quantity, want, unit) in [
             (Quantity::Radiance, 0.7152, "W/(m² sr)"),

@@ -20,15 +20,14 @@ const LARGEST_SIDE: usize = 1 << 16;
 /// Flags of `sheet`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Example: a solution gathered once more is one bounce further, so lamps alone are the solution of 0 bounces
-not gathered, and the picture of k bounces is that of the solution of k - 1:
-  solve-tool solve s.ff --mesh s.mesh -o 0.sol --bounces 0
-  solve-tool solve s.ff --mesh s.mesh -o 2.sol --bounces 2
-  shade-tool render 0.sol --mesh s.mesh -o 0.exr --interpolation constant
-  shade-tool render 0.sol --mesh s.mesh -o 1.exr
-  shade-tool render 2.sol --mesh s.mesh -o 3.exr
-  shade-tool render s.sol --mesh s.mesh -o all.exr
-  shade-tool sheet 0.exr 1.exr 3.exr all.exr -o bounces.png --labels \"0 bounces,1 bounce,3 bounces,converged\""
+    after_help = "Examples: the solutions after 0, 1 and 2 bounces, gathered once more, give the light after 0 to 3 bounces:
+  solve-tool solve s.ff --mesh s.mesh -o 0.sol --bounces 0   (and 1 and 2)
+  shade-tool render s.sol --mesh s.mesh -o s.exr --bounces 0.sol,1.sol,2.sol
+  shade-tool sheet s.exr -o bounces.png --bounces 0,1,3
+Models beside each other, and snapshots of progressive refinement (solve-tool solve --solver southwell --snapshots
+1,10,100) as they are, with their ambient term (shade-tool render --interpolation constant):
+  shade-tool sheet flat.exr phong.exr s.exr -o models.png --labels flat,phong,radiosity
+  shade-tool sheet 1.exr 10.exr 100.exr s.exr -o shots.png --labels \"1 shot,10 shots,100 shots,converged\""
 )]
 pub struct SheetArguments {
     /// Pictures by render, the one that the others are compared with last
@@ -37,6 +36,9 @@ pub struct SheetArguments {
     /// Sheet to write
     #[arg(short, long, value_name = "SHEET.PNG", value_parser = ends_in("png"))]
     pub output: PathBuf,
+    /// Show these layers bounces.N of the last picture before it
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
+    pub bounces: Vec<u32>,
     /// What stands above the pictures (default: their files' names)
     #[arg(long, value_name = "TEXTS", value_delimiter = ',')]
     pub labels: Vec<String>,
@@ -51,7 +53,7 @@ pub struct SheetArguments {
 impl SheetArguments {
     /// Bad usage that single flags do not show.
     pub fn usage(&self) -> std::result::Result<(), String> {
-        match (self.labels.len(), self.pictures.len()) {
+        match (self.labels.len(), self.pictures.len() + self.bounces.len()) {
             (0, _) => Ok(()),
             (labels, pictures) if labels == pictures => Ok(()),
             (labels, pictures) => Err(format!("--labels gives {labels} texts for {pictures} pictures")),
@@ -61,27 +63,33 @@ impl SheetArguments {
     /// Makes the sheet and its report.
     pub fn run(&self) -> Result<()> {
         let mut report = Report::new(TOOL, VERSION);
-        let stored: Vec<StoredPicture> =
+        let mut stored: Vec<StoredPicture> =
             self.pictures.iter().map(|path| StoredPicture::read(path)).collect::<Result<_>>()?;
-        let Some(last) = stored.last() else { return Ok(()) };
+        let Some(last) = stored.pop() else { return Ok(()) };
         let tone = self.tone.fitted(&last.picture);
         tell_exposure(&tone, &mut report);
-        let name = |k: usize| {
-            let stem = self.pictures[k].file_stem().map(|stem| stem.to_string_lossy().into_owned());
-            self.labels.get(k).cloned().or(stem).unwrap_or_default()
+        let stem = |one: &StoredPicture| {
+            one.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
         };
-        let cells: Vec<Cell> = stored
-            .iter()
-            .enumerate()
-            .map(|(k, one)| {
-                let off = difference(&one.picture, &last.picture).filter(|_| k + 1 < stored.len());
-                if let Some(off) = off {
-                    report.estimate(&format!("relative_rms_{k}"), off);
-                }
-                let below = off.map(|off| format!("{} off", percent(off))).unwrap_or_default();
-                Cell { picture: tone.shown(&one.picture), lines: [name(k), below] }
-            })
-            .collect();
+        let mut shown: Vec<(String, Picture)> =
+            stored.into_iter().map(|one| (stem(&one), one.picture)).collect();
+        for &bounces in &self.bounces {
+            let name = if bounces == 1 { "1 bounce".into() } else { format!("{bounces} bounces") };
+            shown.push((name, after(&last, bounces)?));
+        }
+        let mut cells = Vec::new();
+        for (k, (name, picture)) in shown.iter().enumerate() {
+            let off = difference(picture, &last.picture);
+            if let Some(off) = off {
+                report.estimate(&format!("relative_rms_{k}"), off);
+            }
+            let below = off.map(|off| format!("{} off", percent(off))).unwrap_or_default();
+            cells.push(Cell { picture: tone.shown(picture), lines: [name.clone(), below] });
+        }
+        cells.push(Cell { picture: tone.shown(&last.picture), lines: [stem(&last), String::new()] });
+        for (cell, label) in cells.iter_mut().zip(&self.labels) {
+            cell.lines[0].clone_from(label);
+        }
         let columns = self.columns.map_or(COLUMNS, |n| n as usize).min(cells.len());
         let canvas = laid_out(&cells, columns).ok_or_else(|| {
             let found = format!("with the others is more than {LARGEST_SIDE} pixels wide or high");
@@ -91,6 +99,16 @@ impl SheetArguments {
         canvas.write(&self.output)?;
         Ok(report.write_beside(&self.output)?)
     }
+}
+
+/// The light of a picture after so many bounces.
+fn after(stored: &StoredPicture, bounces: u32) -> Result<Picture> {
+    let Picture { width, height, bounces: all, .. } = &stored.picture;
+    let pixels = all.get(bounces as usize).ok_or_else(|| {
+        let found = format!("has no layer bounces.{bounces}");
+        Error::view(&stored.path, found, "render it with --bounces, a solution for each bounce")
+    })?;
+    Ok(Picture { width: *width, height: *height, pixels: pixels.clone(), ..Picture::default() })
 }
 
 /// A picture of the sheet with what stands above it.
