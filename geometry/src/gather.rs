@@ -1,71 +1,85 @@
-//! Everything a point sees: exact point form factors to all elements of a scene.
+//! Everything a point sees: exact point form factors to all elements of a scene, through a tree.
+//!
+//! A cluster beneath the point's horizon, turned away from it, or wholly behind one body gives nothing; a shadow that
+//! does not touch a cluster is not asked again for its elements, nor is a border of it that the cluster lies inside of.
+//! What is left is exact, element by element.
 
+use crate::body::{Body, bodies};
+use crate::element_tree::{Element, ElementTree};
 use crate::occluder::Occluder;
-use crate::patch::Patch;
-use crate::plane::Plane;
 use crate::point_factor::point_factor;
-use crate::sides::SideBits;
-use crate::visible::{self, visible_factor};
+use crate::point_shadow::{Bounds, Candidate, Meets, PointShadows};
+use crate::polygon;
+use crate::visible_part::Pieces;
 use glam::DVec3;
+use std::ops::Range;
 
 /// A scene prepared for gathering.
 #[derive(Debug)]
 pub struct Gatherer {
-    pub(crate) occluders: Vec<Occluder>,
-    /// Elements with area, and their places in the caller's order.
-    pub(crate) elements: Vec<(usize, Patch, SideBits)>,
+    bodies: Vec<Body>,
+    pub(crate) tree: ElementTree,
 }
 
 /// Working memory of [`Gatherer::factors`].
 #[derive(Debug, Default)]
 pub struct Scratch {
-    pub(crate) visible: visible::Scratch,
-    pub(crate) cut: Vec<DVec3>,
-    pub(crate) cones: Vec<Option<Cone>>,
-    /// Stack of candidate lists of a [`crate::source_tree::SourceTree`].
-    pub(crate) candidates: Vec<u32>,
+    shadows: PointShadows,
+    /// Stack of lists of the shadows that may touch a cluster.
+    candidates: Vec<Candidate>,
+    pieces: Pieces,
+    corners: Vec<DVec3>,
+    cut: Vec<DVec3>,
 }
 
-/// A body as a point sees it: within `cosine` of `direction`.
+/// What a walk through the tree finds.
+pub(crate) trait Taker {
+    /// Whether anything below a node is wanted.
+    fn wants(&mut self, node: usize) -> bool;
+    /// Offers a node that lies above the horizon, looks at the point and is hidden nowhere; `true` takes it as a whole.
+    fn takes_node(&mut self, node: usize, to_point: Look) -> bool;
+    /// Offers an element likewise.
+    fn takes_element(&mut self, element: usize, to_point: Look) -> bool;
+    /// An element and its form factor, above 0.
+    fn take(&mut self, element: usize, factor: f64);
+    /// A cluster proved to be wholly behind one body.
+    fn hidden(&mut self) {}
+}
+
+/// Where everything is looked at from.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Cone {
-    pub(crate) direction: DVec3,
-    pub(crate) cosine: f64,
-    pub(crate) sine: f64,
+pub(crate) struct Look {
+    pub(crate) point: DVec3,
+    pub(crate) normal: DVec3,
+    /// Whether clusters wholly behind one body are recognised as such.
+    pub(crate) hidden: bool,
 }
 
-impl Cone {
-    /// Cone around a ball; `None` where the point is inside.
-    pub(crate) fn around(to_centre: DVec3, radius: f64) -> Option<Cone> {
-        let distance = to_centre.length();
-        let sine = radius / distance;
-        (sine < 1.0).then(|| Cone {
-            direction: to_centre / distance,
-            cosine: (1.0 - sine * sine).sqrt(),
-            sine,
-        })
-    }
+struct Every<'a>(&'a [Element], &'a mut dyn FnMut(usize, f64));
 
-    /// Whether two cones may share a direction: cos of the angle between against cos of the sum of the half angles.
-    pub(crate) fn may_meet(&self, other: &Cone) -> bool {
-        self.direction.dot(other.direction) >= self.cosine * other.cosine - self.sine * other.sine
+impl Taker for Every<'_> {
+    fn wants(&mut self, _: usize) -> bool {
+        true
+    }
+    fn takes_node(&mut self, _: usize, _: Look) -> bool {
+        false
+    }
+    fn takes_element(&mut self, _: usize, _: Look) -> bool {
+        false
+    }
+    fn take(&mut self, element: usize, factor: f64) {
+        self.1(self.0[element].index, factor);
     }
 }
 
 impl Gatherer {
     /// Prepares `occluders` and convex `elements`, one-sided, front counter-clockwise. Elements without area take no part.
     pub fn new(occluders: Vec<Occluder>, elements: Vec<Vec<DVec3>>) -> Gatherer {
-        let prepare = |(index, corners): (usize, Vec<DVec3>)| {
-            let patch = Patch::new(corners)?;
-            let bits = SideBits::of_patch(&patch.corners, &patch.plane, patch.radius, &occluders);
-            Some((index, patch, bits))
-        };
-        let elements = elements.into_iter().enumerate().filter_map(prepare).collect();
-        Gatherer { occluders, elements }
+        Gatherer { bodies: bodies(&occluders), tree: ElementTree::new(elements) }
     }
 
     /// Calls `visit(element, F)` for every element with a form factor F > 0 from `point` on a plane with unit `normal`,
-    /// in the elements' order.
+    /// in an order of the gatherer's own.
     ///
     /// The face the point lies on never blocks it, nor do faces coplanar with it: none of their parts is in front. A
     /// point within rounding of an element's edge takes the limit from the side it is on.
@@ -76,38 +90,110 @@ impl Gatherer {
         scratch: &mut Scratch,
         visit: &mut dyn FnMut(usize, f64),
     ) {
-        let plane = Plane { normal, origin: point };
-        let sides = SideBits::of_point(&plane, &self.occluders);
-        let Scratch { visible, cut, cones, .. } = scratch;
-        cones.clear();
-        cones.extend(self.occluders.iter().map(|o| Cone::around(o.centre - point, o.radius)));
+        self.walk(Look { point, normal, hidden: true }, scratch, &mut Every(&self.tree.elements, visit));
+    }
 
-        for (index, element, element_sides) in &self.elements {
-            let seen_from_front = element.plane.distance(point) > 0.0;
-            if !seen_from_front || element.corners.iter().all(|&c| plane.distance(c) <= 0.0) {
-                continue;
+    pub(crate) fn walk(&self, look: Look, scratch: &mut Scratch, taker: &mut impl Taker) {
+        if self.tree.nodes.is_empty() {
+            return;
+        }
+        scratch.shadows.look(look.point, look.normal, &self.bodies);
+        scratch.candidates.clear();
+        scratch.candidates.extend(scratch.shadows.all());
+        let list = 0..scratch.candidates.len();
+        self.visit(0, list, look, scratch, taker);
+    }
+
+    /// Visits a node; `list` is where its parent's candidates stand.
+    fn visit(
+        &self,
+        index: usize,
+        list: Range<usize>,
+        look: Look,
+        scratch: &mut Scratch,
+        taker: &mut impl Taker,
+    ) {
+        let node = &self.tree.nodes[index];
+        let bounds = Bounds { centre: node.middle - look.point, axes: node.axes, radius: node.radius };
+        let (low, high) = bounds.along(look.normal);
+        let turned_away = node.plane.is_some_and(|plane| plane.distance(look.point) <= 0.0);
+        if high <= 0.0 || turned_away || !taker.wants(index) {
+            return;
+        }
+
+        // Pass on the shadows that may touch this cluster; one may take all of it.
+        let start = scratch.candidates.len();
+        for at in list {
+            match scratch.shadows.narrow(scratch.candidates[at], &bounds) {
+                Meets::Nothing => {}
+                Meets::Part(candidate) => scratch.candidates.push(candidate),
+                Meets::Everything if look.hidden => {
+                    taker.hidden();
+                    scratch.candidates.truncate(start);
+                    return;
+                }
+                Meets::Everything => scratch.candidates.push(scratch.candidates[at]),
             }
-            let cone = Cone::around(element.centroid - point, element.radius);
-            let may_block = |k: usize| match (&cone, &cones[k]) {
-                (Some(cone), Some(blocker)) => cone.may_meet(blocker),
-                _ => true,
-            };
-            let mut blocked = false;
-            sides.for_each_candidate(element_sides, self.occluders.len(), |k| blocked |= may_block(k));
-            let factor = if blocked {
-                let mut blockers: Vec<&Occluder> = Vec::new();
-                sides.for_each_candidate(element_sides, self.occluders.len(), |k| {
-                    if may_block(k) {
-                        blockers.push(&self.occluders[k]);
-                    }
-                });
-                visible_factor(point, normal, &element.corners, &blockers, visible).factor
+        }
+        let list = start..scratch.candidates.len();
+
+        let is_free = list.is_empty() && low >= 0.0 && node.plane.is_some();
+        if is_free && taker.takes_node(index, look) {
+            return;
+        }
+        if node.second_child == 0 {
+            for &k in &self.tree.order[node.range.clone()] {
+                self.visit_element(k as usize, list.clone(), look, scratch, taker);
+            }
+        } else {
+            self.visit(index + 1, list.clone(), look, scratch, taker);
+            self.visit(node.second_child, list, look, scratch, taker);
+        }
+        scratch.candidates.truncate(start);
+    }
+
+    fn visit_element(
+        &self,
+        k: usize,
+        list: Range<usize>,
+        look: Look,
+        scratch: &mut Scratch,
+        taker: &mut impl Taker,
+    ) {
+        let element = &self.tree.elements[k];
+        if element.plane.distance(look.point) <= 0.0 {
+            return;
+        }
+        let corners = self.tree.corners(k);
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for &corner in corners {
+            let height = look.normal.dot(corner - look.point);
+            (low, high) = (low.min(height), high.max(height));
+        }
+        if high <= 0.0 {
+            return;
+        }
+        let Scratch { shadows, candidates, pieces, corners: seen, cut } = scratch;
+        let is_free = list.is_empty();
+        if is_free && low >= 0.0 && taker.takes_element(k, look) {
+            return;
+        }
+        let factor = if is_free {
+            point_factor(look.point, look.normal, corners, cut).max(0.0)
+        } else {
+            // The element above the horizon, seen from the point as origin.
+            if low >= 0.0 {
+                seen.clear();
+                seen.extend(corners.iter().map(|&c| c - look.point));
             } else {
-                point_factor(point, normal, &element.corners, cut).max(0.0)
-            };
-            if factor > 0.0 {
-                visit(*index, factor);
+                cut.clear();
+                cut.extend(corners.iter().map(|&c| c - look.point));
+                polygon::clip_by(cut, |r| look.normal.dot(r), seen);
             }
+            pieces.visible(seen, candidates[list].iter().copied(), shadows, look.normal)
+        };
+        if factor > 0.0 {
+            taker.take(k, factor);
         }
     }
 }
@@ -155,5 +241,84 @@ mod tests {
                 assert!((sum - 1.0).abs() < 1e-12, "{point} at scale {scale}: {sum}");
             }
         }
+    }
+
+    fn rectangle(corners: [(f64, f64, f64); 4]) -> Vec<DVec3> {
+        corners.map(|(x, y, z)| DVec3::new(x, y, z)).to_vec()
+    }
+
+    fn square(half: f64, z: f64) -> Vec<DVec3> {
+        rectangle([(-half, -half, z), (half, -half, z), (half, half, z), (-half, half, z)])
+    }
+
+    fn down(mut corners: Vec<DVec3>) -> Vec<DVec3> {
+        corners.reverse();
+        corners
+    }
+
+    /// What a point of the plane z = 0 sees of one light.
+    fn seen(light: &[DVec3], blockers: &[Vec<DVec3>], x: f64, y: f64) -> f64 {
+        let occluders = blockers.iter().cloned().filter_map(Occluder::new).collect();
+        let gatherer = Gatherer::new(occluders, vec![light.to_vec()]);
+        let mut sum = 0.0;
+        let visit = &mut |_, factor| sum += factor;
+        gatherer.factors(DVec3::new(x, y, 0.0), DVec3::Z, &mut Scratch::default(), visit);
+        sum
+    }
+
+    /// Light [-.5, .5]^2 at z = 4, occluder [-1, 1]^2 at z = 2: values to 1e-12 from an independent computation.
+    #[test]
+    fn aligned_squares_have_the_known_point_values() {
+        let light = down(square(0.5, 4.0));
+        for blocker in [square(1.0, 2.0), down(square(1.0, 2.0))] {
+            for (x, y, want) in [
+                (1.4, 0.0, 0.0),
+                (1.75, 0.0, 0.003_940_506_609),
+                (2.0, 0.0, 0.006_946_576_463),
+                (2.4, 0.0, 0.009_851_475_759),
+                (3.0, 0.0, 0.008_156_271_523),
+                (2.0, 2.0, 0.006_974_755_489),
+                (1.75, 2.25, 0.007_382_268_251),
+            ] {
+                let got = seen(&light, std::slice::from_ref(&blocker), x, y);
+                assert!((got - want).abs() < 6e-13, "({x}, {y}): {got} {want}");
+            }
+        }
+    }
+
+    #[test]
+    fn overlapping_and_repeated_blockers_block_once() {
+        let (light, one) = (down(square(0.5, 4.0)), square(1.0, 2.0));
+        let halves = [
+            rectangle([(-1.0, -1.0, 2.0), (0.3, -1.0, 2.0), (0.3, 1.0, 2.0), (-1.0, 1.0, 2.0)]),
+            rectangle([(-0.2, -1.0, 2.0), (1.0, -1.0, 2.0), (1.0, 1.0, 2.0), (-0.2, 1.0, 2.0)]),
+        ];
+        for (x, y) in [(1.75, 0.0), (2.0, 2.0), (-1.9, 0.4), (0.0, 0.0)] {
+            let want = seen(&light, std::slice::from_ref(&one), x, y);
+            assert!((seen(&light, &[one.clone(), one.clone()], x, y) - want).abs() < 1e-16);
+            assert!((seen(&light, &halves, x, y) - want).abs() < 1e-16);
+        }
+    }
+
+    #[test]
+    fn a_contact_wall_blocks_one_side_only() {
+        // Wall x = 0, |y| <= 1, 0 <= z <= 1 on the floor; light [1.5, 2.5] x [-.5, .5] at z = 4.
+        let wall = [rectangle([(0.0, -1.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, 1.0), (0.0, -1.0, 1.0)])];
+        let light = rectangle([(1.5, 0.5, 4.0), (2.5, 0.5, 4.0), (2.5, -0.5, 4.0), (1.5, -0.5, 4.0)]);
+        let seen = |x: f64, y: f64| seen(&light, &wall, x, y);
+        assert!((seen(1e-12, 0.0) - 0.012_646_605_888).abs() < 1e-12);
+        assert!((seen(1e-12, 0.9) - 0.011_701_807_558).abs() < 1e-12);
+        assert_eq!(seen(-1e-12, 0.0), 0.0);
+        assert!((seen(-0.6, 0.0) - 0.003_418_156_753).abs() < 1e-12);
+        assert!((seen(-0.7, 0.0) - 0.006_137_826_648).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_blocker_that_crosses_the_light_hides_only_what_is_behind_it() {
+        // A vertical plate through the light's middle, from z = 2 to 5, across the whole light: from x = 1 the far half is hidden.
+        let plate = [rectangle([(0.0, -2.0, 2.0), (0.0, 2.0, 2.0), (0.0, 2.0, 5.0), (0.0, -2.0, 5.0)])];
+        let near = rectangle([(0.0, 0.5, 4.0), (0.5, 0.5, 4.0), (0.5, -0.5, 4.0), (0.0, -0.5, 4.0)]);
+        let (got, want) = (seen(&down(square(0.5, 4.0)), &plate, 1.0, 0.0), seen(&near, &[], 1.0, 0.0));
+        assert!((got - want).abs() < 1e-15 && want > 0.0, "{got} {want}");
     }
 }

@@ -7,7 +7,7 @@ use crate::quadrature::gauss;
 use crate::shadow::{Blocking, From, Set, Shadows};
 use crate::shadow_planes::{ShadowPlane, WORTHLESS_CUT, shadow_planes};
 use crate::visible_four::{self, LANES, visible_factors};
-use crate::visible_part::{self, visible_factor};
+use crate::visible_part::{Pieces, visible_factor};
 use glam::DVec3;
 use std::collections::BinaryHeap;
 use std::ops::Range;
@@ -120,7 +120,7 @@ impl Ord for Cell {
 /// Working memory of [`exchange`].
 #[derive(Debug, Default)]
 pub struct Scratch {
-    visible: visible_part::Scratch,
+    visible: Pieces,
     four: visible_four::Scratch,
     corners: Vec<DVec3>,
     cells: BinaryHeap<Cell>,

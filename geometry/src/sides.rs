@@ -1,4 +1,4 @@
-//! For every receiver (patch or point) and occluder the side facts that rule a blocker out, as bits: a pair's
+//! For every patch and occluder the side facts that rule a blocker out, as bits: a pair's
 //! possible blockers come from a few words of logic instead of a loop over the scene.
 //!
 //! A blocker cannot matter where both ends lie on one side of its plane, or where it lies wholly behind the plane of
@@ -8,11 +8,7 @@ use crate::occluder::Occluder;
 use crate::plane::{PLANARITY, Plane};
 use glam::DVec3;
 
-/// A point this close to an occluder's plane (in units of the occluder's size) has no side: rounding of its height.
-/// Far below the distance that nodes are moved inward from a contact line.
-const POINT_ROUNDING: f64 = 1e-13;
-
-/// Bits of one receiver, one per occluder.
+/// Bits of one patch, one per occluder.
 #[derive(Debug, Clone, Default)]
 pub struct SideBits {
     /// The receiver lies at or in front of the occluder's plane.
@@ -26,26 +22,11 @@ pub struct SideBits {
 impl SideBits {
     /// Facts of a patch with these corners, plane and size.
     pub fn of_patch(corners: &[DVec3], plane: &Plane, radius: f64, occluders: &[Occluder]) -> Self {
-        Self::new(corners, plane, occluders, |occluder| PLANARITY * (occluder.radius + radius))
-    }
-
-    /// Facts of a point on a plane.
-    pub fn of_point(plane: &Plane, occluders: &[Occluder]) -> Self {
-        Self::new(&[plane.origin], plane, occluders, |occluder| POINT_ROUNDING * occluder.radius)
-    }
-
-    /// `closeness` is the height over an occluder's plane that counts as none.
-    fn new(
-        corners: &[DVec3],
-        plane: &Plane,
-        occluders: &[Occluder],
-        closeness: impl Fn(&Occluder) -> f64,
-    ) -> Self {
         let words = occluders.len().div_ceil(64);
         let mut bits = Self { front: vec![0; words], back: vec![0; words], beneath: vec![0; words] };
         for (k, occluder) in occluders.iter().enumerate() {
             let (word, bit) = (k / 64, 1u64 << (k % 64));
-            let tolerance = closeness(occluder);
+            let tolerance = PLANARITY * (occluder.radius + radius);
             let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
             for &corner in corners {
                 let height = occluder.plane.distance(corner);
@@ -62,16 +43,6 @@ impl SideBits {
             }
         }
         bits
-    }
-
-    /// What holds for both.
-    pub fn common(&self, other: &SideBits) -> SideBits {
-        let and = |a: &[u64], b: &[u64]| a.iter().zip(b).map(|(a, b)| a & b).collect();
-        SideBits {
-            front: and(&self.front, &other.front),
-            back: and(&self.back, &other.back),
-            beneath: and(&self.beneath, &other.beneath),
-        }
     }
 
     /// Calls `visit` with every occluder out of `count` that may block between two receivers, in order.
@@ -93,7 +64,7 @@ impl SideBits {
         }
     }
 
-    /// Whether the occluder may block between the two receivers.
+    /// Whether the occluder may block between the two patches.
     pub fn may_block(&self, other: &SideBits, occluder: usize) -> bool {
         let (word, bit) = (occluder / 64, 1u64 << (occluder % 64));
         let harmless = (self.front[word] & other.front[word])

@@ -1,26 +1,17 @@
-//! Sources gathered at a point through a tree: what all of a cluster's elements have in common is decided once.
+//! Sources gathered at a point, far ones together.
 //!
-//! A cluster beneath the point's horizon, turned away from it, or wholly behind one blocker gives nothing; a blocker that
-//! cannot reach into the shaft to a cluster is not asked again for its elements. What is left is exact, element by
-//! element. Where an error is allowed, a flat, unblocked cluster seen under a small angle is not opened: its sources
-//! count by their moments, Taylor's series of the kernel to second order (as far blocks in hierarchical radiosity, Hanrahan,
+//! As [`crate::gather`], but where an error is allowed a flat, unblocked cluster seen under a small angle is not opened: its
+//! sources count by their moments, Taylor's series of the kernel to second order (as far blocks in hierarchical radiosity, Hanrahan,
 //! Salzman & Aupperle 1991, but with the field's variation inside the cluster instead of its mean).
 //!
 //! # Precision
 //! An unopened cluster of radius R at distance d is off by a few (R / d)^3 of its own share: see [`SourceTree::gather`].
 
-use crate::gather::{Cone, Gatherer, Scratch};
-use crate::patch::Patch;
-use crate::plane::{PLANARITY, Plane};
-use crate::point_factor::point_factor;
-use crate::sides::SideBits;
-use crate::visible::visible_factor;
+use crate::element_tree::{Element, ElementTree, Node};
+use crate::gather::{Gatherer, Look, Scratch, Taker};
+use crate::plane::Plane;
 use glam::DVec3;
 use std::f64::consts::FRAC_1_PI;
-use std::ops::Range;
-
-/// Elements in a leaf: fewer cost more lists than they spare.
-const LEAF: usize = 4;
 
 /// A scene with the strengths of its sources, N numbers each.
 #[derive(Debug)]
@@ -28,27 +19,27 @@ pub struct SourceTree<const N: usize> {
     gatherer: Gatherer,
     /// Strength of each of the gatherer's elements.
     strengths: Vec<[f64; N]>,
-    /// Moments of each of the gatherer's elements.
-    element_moments: Vec<Moments<N>>,
-    /// Elements in the order of the leaves.
-    order: Vec<u32>,
-    /// Depth first: the first child follows its parent.
-    nodes: Vec<Node<N>>,
+    /// Of each of the gatherer's elements.
+    element_sources: Vec<Source<N>>,
+    /// Of each node of the gatherer's tree.
+    node_sources: Vec<NodeSource<N>>,
+}
+
+/// Sources in one plane, as they look from afar.
+#[derive(Debug, Clone)]
+struct Source<const N: usize> {
+    /// Centre of gravity of the area, and the largest distance from it.
+    centre: DVec3,
+    radius: f64,
+    normal: DVec3,
+    moments: Moments<N>,
 }
 
 #[derive(Debug)]
-struct Node<const N: usize> {
-    range: Range<usize>,
-    /// 0 for a leaf.
-    second_child: usize,
-    centre: DVec3,
-    radius: f64,
-    /// What holds for all elements.
-    bits: SideBits,
+struct NodeSource<const N: usize> {
     /// Whether anything here has a strength.
     lit: bool,
-    /// Plane and moments, where all elements lie in one plane and look the same way.
-    flat: Option<(Plane, Moments<N>)>,
+    flat: Option<Source<N>>,
 }
 
 /// Moments of the sources over their plane, about a centre.
@@ -87,99 +78,71 @@ impl Opening {
     pub const EXACT: Opening = Opening { far: 0.0, hidden: true };
 }
 
-struct Look<'a> {
-    point: DVec3,
-    normal: DVec3,
-    opening: Opening,
-    sides: &'a SideBits,
+/// Adds up what a walk finds.
+struct Sum<'a, const N: usize> {
+    tree: &'a SourceTree<N>,
+    far: f64,
+    sum: [f64; N],
+    counts: Counts,
+}
+
+impl<const N: usize> Sum<'_, N> {
+    /// Adds sources by their moments, if they are far enough.
+    fn takes(&mut self, source: &Source<N>, look: Look) -> bool {
+        let to_centre = source.centre - look.point;
+        let height = look.normal.dot(to_centre);
+        let is_far = height >= source.radius
+            && source.radius * source.radius < self.far * self.far * to_centre.length_squared();
+        if is_far {
+            source.moments.add_to(&mut self.sum, to_centre, source.normal, look.normal);
+            self.counts.far += 1;
+        }
+        is_far
+    }
+}
+
+impl<const N: usize> Taker for Sum<'_, N> {
+    fn wants(&mut self, node: usize) -> bool {
+        self.tree.node_sources[node].lit
+    }
+
+    fn takes_node(&mut self, node: usize, look: Look) -> bool {
+        let tree = self.tree;
+        tree.node_sources[node].flat.as_ref().is_some_and(|source| self.takes(source, look))
+    }
+
+    fn takes_element(&mut self, element: usize, look: Look) -> bool {
+        let tree = self.tree;
+        self.takes(&tree.element_sources[element], look)
+    }
+
+    fn take(&mut self, element: usize, factor: f64) {
+        self.counts.exact += 1;
+        for (sum, strength) in self.sum.iter_mut().zip(&self.tree.strengths[element]) {
+            *sum += factor * strength;
+        }
+    }
+
+    fn hidden(&mut self) {
+        self.counts.hidden += 1;
+    }
 }
 
 impl<const N: usize> SourceTree<N> {
     /// Prepares the elements of `gatherer`, with `strengths` in the order they were given to it.
     pub fn new(gatherer: Gatherer, strengths: &[[f64; N]]) -> SourceTree<N> {
-        let elements = &gatherer.elements;
-        let strengths: Vec<[f64; N]> =
-            elements.iter().map(|(index, ..)| strengths.get(*index).copied().unwrap_or([0.0; N])).collect();
-        let element_moments =
-            elements.iter().zip(&strengths).map(|((_, patch, _), s)| Moments::of_patch(patch, s)).collect();
-        let order: Vec<u32> = (0..elements.len() as u32).collect();
-        let mut tree = SourceTree { gatherer, strengths, element_moments, order, nodes: Vec::new() };
-        if !tree.order.is_empty() {
-            let all = 0..tree.order.len();
-            tree.grow(all);
-        }
-        tree
-    }
-
-    /// Grows the node over a range of the order, and all below it; returns its index.
-    fn grow(&mut self, range: Range<usize>) -> usize {
-        let index = self.nodes.len();
-        let node = self.node(range.clone());
-        let leaf = range.len() <= LEAF;
-        self.nodes.push(node);
-        if !leaf {
-            let middle = self.split(range.clone());
-            self.grow(range.start..middle);
-            self.nodes[index].second_child = self.grow(middle..range.end);
-        }
-        index
-    }
-
-    /// Orders a range along its longest extent, directions counting like the size of the range, and returns its middle.
-    fn split(&mut self, range: Range<usize>) -> usize {
-        let elements = &self.gatherer.elements;
-        let patch = |k: u32| &elements[k as usize].1;
-        let spread = |key: &dyn Fn(&Patch) -> f64| {
-            let keys = self.order[range.clone()].iter().map(|&k| key(patch(k)));
-            let (low, high) =
-                keys.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
-            high - low
-        };
-        let size = (0..3).map(|c| spread(&|p| p.centroid[c])).fold(0.0, f64::max);
-        let (mut axis, mut widest) = (0, f64::NEG_INFINITY);
-        for candidate in 0..6 {
-            let extent = match candidate {
-                0..3 => spread(&|p| p.centroid[candidate]),
-                _ => size * spread(&|p| p.plane.normal[candidate - 3]),
-            };
-            if extent > widest {
-                (axis, widest) = (candidate, extent);
-            }
-        }
-        let key = |&k: &u32| match axis {
-            0..3 => patch(k).centroid[axis],
-            _ => patch(k).plane.normal[axis - 3],
-        };
-        // Directions split at their largest gap would serve walls better than halves do, but halves keep the tree shallow.
-        let by_key = |a: &u32, b: &u32| key(a).total_cmp(&key(b)).then(a.cmp(b));
-        let middle = range.len() / 2;
-        self.order[range.clone()].select_nth_unstable_by(middle, by_key);
-        range.start + middle
-    }
-
-    fn node(&self, range: Range<usize>) -> Node<N> {
-        let members: Vec<usize> = self.order[range.clone()].iter().map(|&k| k as usize).collect();
-        let elements = &self.gatherer.elements;
-        let area: f64 = members.iter().map(|&k| elements[k].1.area).sum();
-        let weighted: DVec3 = members.iter().map(|&k| elements[k].1.area * elements[k].1.centroid).sum();
-        let centre = weighted / area;
-        let corners = members.iter().flat_map(|&k| &elements[k].1.corners);
-        let radius = corners.map(|&corner| corner.distance(centre)).fold(0.0, f64::max);
-        let bits =
-            members[1..].iter().fold(elements[members[0]].2.clone(), |bits, &k| bits.common(&elements[k].2));
-        let plane = elements[members[0]].1.plane;
-        let in_plane = |k: &usize| {
-            let patch = &elements[*k].1;
-            plane.normal.dot(patch.plane.normal) > 0.0
-                && patch.corners.iter().all(|&c| plane.distance(c).abs() <= PLANARITY * radius)
-        };
-        let flat = members.iter().all(in_plane).then(|| {
+        let tree = &gatherer.tree;
+        let strength = |element: &Element| strengths.get(element.index).copied().unwrap_or([0.0; N]);
+        let strengths: Vec<[f64; N]> = tree.elements.iter().map(strength).collect();
+        let element_sources = (0..tree.elements.len()).map(|k| {
+            let Element { plane, centroid, radius, .. } = tree.elements[k];
             let mut moments = Moments::none(&plane);
-            members.iter().for_each(|&k| moments.add(&elements[k].1, &self.strengths[k], centre));
-            (plane, moments)
+            moments.add(tree.corners(k), &plane, &strengths[k], centroid);
+            Source { centre: centroid, radius, normal: plane.normal, moments }
         });
-        let lit = members.iter().any(|&k| self.strengths[k].iter().any(|&s| s != 0.0));
-        Node { range, second_child: 0, centre, radius, bits, lit, flat }
+        let element_sources = element_sources.collect();
+        let node_sources = tree.nodes.iter().map(|node| NodeSource::new(tree, node, &strengths)).collect();
+        SourceTree { gatherer, strengths, element_sources, node_sources }
     }
 
     /// Sum over the elements of form factor times strength, at `point` on a plane with unit `normal`; and how it was found.
@@ -194,155 +157,26 @@ impl<const N: usize> SourceTree<N> {
         opening: Opening,
         scratch: &mut Scratch,
     ) -> ([f64; N], Counts) {
-        let (mut sum, mut counts) = ([0.0; N], Counts::default());
-        if self.nodes.is_empty() {
-            return (sum, counts);
-        }
-        let occluders = &self.gatherer.occluders;
-        let sides = SideBits::of_point(&Plane { normal, origin: point }, occluders);
-        scratch.cones.clear();
-        scratch.cones.extend(occluders.iter().map(|o| Cone::around(o.centre - point, o.radius)));
-        scratch.candidates.clear();
-        scratch.candidates.extend(0..occluders.len() as u32);
-        let look = Look { point, normal, opening, sides: &sides };
-        self.visit(0, 0..occluders.len(), &look, scratch, &mut sum, &mut counts);
-        (sum, counts)
+        let mut sum = Sum { tree: self, far: opening.far, sum: [0.0; N], counts: Counts::default() };
+        self.gatherer.walk(Look { point, normal, hidden: opening.hidden }, scratch, &mut sum);
+        (sum.sum, sum.counts)
     }
+}
 
-    /// Adds what a node gives; `list` is where its parent's candidates stand.
-    fn visit(
-        &self,
-        index: usize,
-        list: Range<usize>,
-        look: &Look<'_>,
-        scratch: &mut Scratch,
-        sum: &mut [f64; N],
-        counts: &mut Counts,
-    ) {
-        let node = &self.nodes[index];
-        let to_centre = node.centre - look.point;
-        let height = look.normal.dot(to_centre);
-        let turned_away = |(plane, _): &(Plane, _)| plane.distance(look.point) <= 0.0;
-        if !node.lit || height <= -node.radius || node.flat.as_ref().is_some_and(turned_away) {
-            return;
-        }
-
-        // Pass on the blockers that may reach into the shaft to this cluster; one may take all of it.
-        let cone = Cone::around(to_centre, node.radius);
-        let start = scratch.candidates.len();
-        for at in list {
-            let k = scratch.candidates[at] as usize;
-            let blocker_cone = &scratch.cones[k];
-            let meets = cone.as_ref().zip(blocker_cone.as_ref()).is_none_or(|(a, b)| a.may_meet(b));
-            if !meets || !look.sides.may_block(&node.bits, k) {
-                continue;
-            }
-            if look.opening.hidden && self.hides(k, look.point, to_centre, node.radius, &cone, blocker_cone) {
-                counts.hidden += 1;
-                scratch.candidates.truncate(start);
-                return;
-            }
-            scratch.candidates.push(k as u32);
-        }
-        let list = start..scratch.candidates.len();
-
-        let is_far = |radius: f64, height: f64, squared: f64| {
-            height >= radius && radius * radius < look.opening.far * look.opening.far * squared
-        };
-        let unblocked = list.is_empty();
-        match &node.flat {
-            Some((plane, moments))
-                if unblocked && is_far(node.radius, height, to_centre.length_squared()) =>
-            {
-                moments.add_to(sum, to_centre, plane.normal, look.normal);
-                counts.far += 1;
-            }
-            _ if node.second_child == 0 => {
-                for &k in &self.order[node.range.clone()] {
-                    self.visit_element(k as usize, list.clone(), look, scratch, sum, counts);
-                }
-            }
-            _ => {
-                self.visit(index + 1, list.clone(), look, scratch, sum, counts);
-                self.visit(node.second_child, list, look, scratch, sum, counts);
-            }
-        }
-        scratch.candidates.truncate(start);
-    }
-
-    fn visit_element(
-        &self,
-        k: usize,
-        list: Range<usize>,
-        look: &Look<'_>,
-        scratch: &mut Scratch,
-        sum: &mut [f64; N],
-        counts: &mut Counts,
-    ) {
-        let (_, patch, bits) = &self.gatherer.elements[k];
-        let horizon = Plane { normal: look.normal, origin: look.point };
-        if patch.plane.distance(look.point) <= 0.0
-            || patch.corners.iter().all(|&c| horizon.distance(c) <= 0.0)
-        {
-            return;
-        }
-        let to_centre = patch.centroid - look.point;
-        let Scratch { visible, cut, cones, candidates } = scratch;
-        let cone = Cone::around(to_centre, patch.radius);
-        let blockers = candidates[list].iter().map(|&b| b as usize).filter(|&b| {
-            cone.as_ref().zip(cones[b].as_ref()).is_none_or(|(a, b)| a.may_meet(b))
-                && look.sides.may_block(bits, b)
+impl<const N: usize> NodeSource<N> {
+    fn new(tree: &ElementTree, node: &Node, strengths: &[[f64; N]]) -> NodeSource<N> {
+        let lit = tree.members(node).any(|k| strengths[k].iter().any(|&s| s != 0.0));
+        let flat = node.plane.filter(|_| lit).map(|plane| {
+            let area: f64 = tree.members(node).map(|k| tree.elements[k].area).sum();
+            let weighted: DVec3 = tree.members(node).map(|k| tree.elements[k].area * tree.elements[k].centroid).sum();
+            let centre = weighted / area;
+            let corners = tree.members(node).flat_map(|k| tree.corners(k));
+            let radius = corners.map(|corner| corner.distance(centre)).fold(0.0, f64::max);
+            let mut moments = Moments::none(&plane);
+            tree.members(node).for_each(|k| moments.add(tree.corners(k), &plane, &strengths[k], centre));
+            Source { centre, radius, normal: plane.normal, moments }
         });
-        let blockers: Vec<_> = blockers.map(|b| &self.gatherer.occluders[b]).collect();
-        let far = look.opening.far;
-        let factor = if !blockers.is_empty() {
-            counts.exact += 1;
-            visible_factor(look.point, look.normal, &patch.corners, &blockers, visible).factor
-        } else if look.normal.dot(to_centre) >= patch.radius
-            && patch.radius * patch.radius < far * far * to_centre.length_squared()
-        {
-            counts.far += 1;
-            let moments = &self.element_moments[k];
-            moments.add_to(sum, to_centre, patch.plane.normal, look.normal);
-            return;
-        } else {
-            counts.exact += 1;
-            point_factor(look.point, look.normal, &patch.corners, cut).max(0.0)
-        };
-        for (sum, strength) in sum.iter_mut().zip(&self.strengths[k]) {
-            *sum += factor * strength;
-        }
-    }
-
-    /// Whether the ball at `to_centre` from the point lies inside the blocker's pyramid, beyond its plane.
-    fn hides(
-        &self,
-        k: usize,
-        point: DVec3,
-        to_centre: DVec3,
-        radius: f64,
-        cone: &Option<Cone>,
-        blocker_cone: &Option<Cone>,
-    ) -> bool {
-        let blocker = &self.gatherer.occluders[k];
-        // Cheap first: a ball that looks larger, or whose centre lies outside the blocker's cone, is not hidden.
-        let Some(cone) = cone else { return false };
-        if blocker_cone
-            .as_ref()
-            .is_some_and(|b| b.sine < cone.sine || b.direction.dot(cone.direction) < b.cosine)
-        {
-            return false;
-        }
-        let height = blocker.plane.distance(point);
-        let inward = -height.signum();
-        if height == 0.0 || inward * (blocker.plane.normal.dot(to_centre) + height) < radius {
-            return false;
-        }
-        crate::polygon::edges(&blocker.corners).all(|(a, b)| {
-            let side = inward * (a - point).cross(b - point);
-            let along = side.dot(to_centre);
-            along > 0.0 && along * along >= radius * radius * side.length_squared()
-        })
+        NodeSource { lit, flat }
     }
 }
 
@@ -352,19 +186,13 @@ impl<const N: usize> Moments<N> {
         Moments { axes: [u, v], zeroth: [0.0; N], first: [[0.0; N]; 2], second: [[0.0; N]; 3] }
     }
 
-    fn of_patch(patch: &Patch, strength: &[f64; N]) -> Moments<N> {
-        let mut moments = Moments::none(&patch.plane);
-        moments.add(patch, strength, patch.centroid);
-        moments
-    }
-
-    /// Adds a patch of even strength: over a triangle with corners u_i, of area A, u has the mean of the corners and
+    /// Adds a polygon of even strength: over a triangle with corners u_i, of area A, u has the mean of the corners and
     /// u v the integral A / 12 (sum u_i v_i + sum u_i sum v_i).
-    fn add(&mut self, patch: &Patch, strength: &[f64; N], centre: DVec3) {
+    fn add(&mut self, polygon: &[DVec3], plane: &Plane, strength: &[f64; N], centre: DVec3) {
         let (mut area, mut first, mut second) = (0.0, [0.0; 2], [0.0; 3]);
-        for k in 2..patch.corners.len() {
-            let corners = [patch.corners[0], patch.corners[k - 1], patch.corners[k]];
-            let twice = (corners[1] - corners[0]).cross(corners[2] - corners[0]).dot(patch.plane.normal);
+        for k in 2..polygon.len() {
+            let corners = [polygon[0], polygon[k - 1], polygon[k]];
+            let twice = (corners[1] - corners[0]).cross(corners[2] - corners[0]).dot(plane.normal);
             let places = corners.map(|corner| self.axes.map(|axis| axis.dot(corner - centre)));
             let sum = [0, 1].map(|c| places.iter().map(|p| p[c]).sum::<f64>());
             area += 0.5 * twice;

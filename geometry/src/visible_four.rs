@@ -496,7 +496,7 @@ mod tests {
             compared += 1;
             for (point, got) in points.iter().zip(four) {
                 let (which, from) = which.clone();
-                let scratch = &mut visible_part::Scratch::default();
+                let scratch = &mut visible_part::Pieces::default();
                 let want = visible_factor(*point, DVec3::Z, &source, &shadows, which, from, scratch);
                 assert!((got - want).abs() < 1e-14, "round {round}: {got} {want}");
                 shadowed += usize::from(!shadows.is_empty() && want > 0.0);

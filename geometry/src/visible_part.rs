@@ -5,6 +5,7 @@
 //! Cuts are interpolations along edges; there is no epsilon.
 
 use crate::point_factor::above_horizon;
+use crate::point_shadow::{Candidate, PointShadows};
 use crate::polygon;
 use crate::shadow::{From, HalfSpace, Shadows};
 use glam::DVec3;
@@ -12,12 +13,12 @@ use std::ops::Range;
 
 /// Convex polygons in one flat array, reused from call to call.
 #[derive(Debug, Clone, Default)]
-struct Pieces {
+struct Polygons {
     points: Vec<DVec3>,
     ends: Vec<usize>,
 }
 
-impl Pieces {
+impl Polygons {
     fn clear(&mut self) {
         self.points.clear();
         self.ends.clear();
@@ -36,15 +37,57 @@ impl Pieces {
     }
 }
 
-/// Working memory of [`visible_factor`].
+/// The pieces of one polygon that are still seen, with working memory for cutting them.
 #[derive(Debug, Clone, Default)]
-pub struct Scratch {
-    pieces: Pieces,
-    next: Pieces,
+pub struct Pieces {
+    pieces: Polygons,
+    next: Polygons,
     rest: Vec<DVec3>,
     cut: Vec<DVec3>,
     half_spaces: Vec<HalfSpace>,
     heights: Vec<f64>,
+}
+
+impl Pieces {
+    /// Form factor from a surface element with unit `normal` to a convex polygon, given from that element's point on and
+    /// above its horizon, as far as the shadows of the `candidates` leave it in sight.
+    pub(crate) fn visible(
+        &mut self,
+        corners: &[DVec3],
+        candidates: impl Iterator<Item = Candidate>,
+        shadows: &PointShadows,
+        normal: DVec3,
+    ) -> f64 {
+        self.start(corners.iter().copied());
+        for candidate in candidates {
+            shadows.half_spaces(candidate, &mut self.half_spaces);
+            self.subtract();
+            if self.pieces.ends.is_empty() {
+                return 0.0;
+            }
+        }
+        self.factor(normal)
+    }
+
+    fn start(&mut self, corners: impl Iterator<Item = DVec3>) {
+        self.pieces.clear();
+        self.pieces.points.extend(corners);
+        self.pieces.ends.push(self.pieces.points.len());
+    }
+
+    /// Takes what lies in all half-spaces out of the pieces.
+    fn subtract(&mut self) {
+        let Pieces { pieces, next, rest, cut, half_spaces, heights } = self;
+        next.clear();
+        for piece in pieces.iter() {
+            subtract(piece, half_spaces, next, rest, cut, heights);
+        }
+        std::mem::swap(pieces, next);
+    }
+
+    fn factor(&self, normal: DVec3) -> f64 {
+        self.pieces.iter().map(|piece| above_horizon(DVec3::ZERO, normal, piece)).sum::<f64>().max(0.0)
+    }
 }
 
 /// Form factor from a surface element at `point` with unit `normal` to the front of a convex polygon that lies above the
@@ -56,33 +99,26 @@ pub fn visible_factor(
     shadows: &Shadows<'_>,
     which: Range<usize>,
     from: From,
-    scratch: &mut Scratch,
+    scratch: &mut Pieces,
 ) -> f64 {
-    let Scratch { pieces, next, rest, cut, half_spaces, heights } = scratch;
-    pieces.clear();
-    pieces.points.extend(corners.iter().map(|&c| c - point));
-    pieces.ends.push(corners.len());
+    scratch.start(corners.iter().map(|&c| c - point));
     for at in which {
-        if !shadows.half_spaces(at, from, point, half_spaces) {
+        if !shadows.half_spaces(at, from, point, &mut scratch.half_spaces) {
             continue;
         }
-        next.clear();
-        for piece in pieces.iter() {
-            subtract(piece, half_spaces, next, rest, cut, heights);
-        }
-        std::mem::swap(pieces, next);
-        if pieces.ends.is_empty() {
+        scratch.subtract();
+        if scratch.pieces.ends.is_empty() {
             return 0.0;
         }
     }
-    pieces.iter().map(|piece| above_horizon(DVec3::ZERO, normal, piece)).sum::<f64>().max(0.0)
+    scratch.factor(normal)
 }
 
 /// Appends to `out` the parts of a convex piece that lie outside some half-space.
 fn subtract(
     piece: &[DVec3],
     half_spaces: &[HalfSpace],
-    out: &mut Pieces,
+    out: &mut Polygons,
     rest: &mut Vec<DVec3>,
     cut: &mut Vec<DVec3>,
     heights: &mut Vec<f64>,

@@ -5,7 +5,7 @@ mod common;
 use common::*;
 use geometry::occluder::Occluder;
 use geometry::polygon;
-use geometry::visible::{Scratch, visible_factor};
+use geometry::gather::{Gatherer, Scratch};
 use glam::DVec3;
 use interchange::mesh::Mesh;
 use mesh_tool::Options;
@@ -16,8 +16,7 @@ use mesh_tool::discontinuity::Order;
 struct Shadow {
     text: String,
     up: DVec3,
-    light: Vec<DVec3>,
-    occluder: Occluder,
+    gatherer: Gatherer,
     floor: [f64; 2],
 }
 
@@ -41,7 +40,8 @@ impl Shadow {
             }
             text += &format!("usemtl {material}\nf -4 -3 -2 -1\n");
         }
-        Shadow { text, up: DVec3::Z, light, occluder: Occluder::new(occluder).unwrap(), floor }
+        let gatherer = Gatherer::new(vec![Occluder::new(occluder).unwrap()], vec![light]);
+        Shadow { text, up: DVec3::Z, gatherer, floor }
     }
 
     /// `penumbra.obj`: the lines lie closer together.
@@ -53,11 +53,14 @@ impl Shadow {
         let text = text.replace("mtllib penumbra.mtl", "").replace("usemtl light", "usemtl lamp");
         let text = text.replace("usemtl floor", "usemtl white").replace("usemtl black", "usemtl grey");
         let occluder = Occluder::new(square(0.4, 1.0).to_vec()).unwrap();
-        Shadow { text, up: DVec3::Y, light: square(0.5, 2.0).to_vec(), occluder, floor: [-3.0, 3.0] }
+        let gatherer = Gatherer::new(vec![occluder], vec![square(0.5, 2.0).to_vec()]);
+        Shadow { text, up: DVec3::Y, gatherer, floor: [-3.0, 3.0] }
     }
 
     fn at(&self, point: DVec3, scratch: &mut Scratch) -> f64 {
-        visible_factor(point, self.up, &self.light, &[&self.occluder], scratch).factor
+        let mut sum = 0.0;
+        self.gatherer.factors(point, self.up, scratch, &mut |_, factor| sum += factor);
+        sum
     }
 
     /// RMS and largest error over triangles, relative to the brightest place.

@@ -4,7 +4,7 @@
 mod common;
 use common::*;
 use geometry::occluder::Occluder;
-use geometry::visible::{Scratch, visible_factor};
+use geometry::gather::{Gatherer, Scratch};
 use glam::DVec3;
 use interchange::report::Report;
 use interchange::scene::Scene;
@@ -156,10 +156,14 @@ fn curvature_jumps_where_the_top_corner_passes_an_edge_of_the_light() {
         given.iter().map(|&(x, y, z)| DVec3::new(x, y, z)).collect()
     };
     let wall = Occluder::new(corners(&wall)).unwrap();
-    let light = corners(&light);
+    let gatherer = Gatherer::new(vec![wall], vec![corners(&light)]);
     let mut scratch = Scratch::default();
-    let mut seen =
-        |y: f64| visible_factor(DVec3::new(-0.7, y, 0.0), DVec3::Z, &light, &[&wall], &mut scratch).factor;
+    let mut seen = |y: f64| {
+        let mut sum = 0.0;
+        let visit = &mut |_, factor| sum += factor;
+        gatherer.factors(DVec3::new(-0.7, y, 0.0), DVec3::Z, &mut scratch, visit);
+        sum
+    };
     // One-sided second differences, of second order.
     let h = 1e-3;
     for y in [7.0 / 6.0, 1.5] {
