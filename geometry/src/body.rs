@@ -2,7 +2,9 @@
 //!
 //! A closed convex surface blocks exactly the segments that meet its inside. So does one with a single flat opening (a block
 //! without a bottom, standing on a floor), for ends outside its hull: what enters through the opening cannot leave through
-//! the same plane. Any other blocker is a flat body of its own: a polygon with two sides.
+//! the same plane. And so does one with further openings that lie wholly on a face of something else (a chair's leg without
+//! ends, between the floor and the seat): what would enter there is blocked by that face. Any other blocker is a flat body of
+//! its own: a polygon with two sides.
 
 use crate::occluder::Occluder;
 use crate::plane::{PLANARITY, Plane};
@@ -160,7 +162,21 @@ impl<'a> Surface<'a> {
         members
     }
 
-    /// The solid that the members bound, with at most one flat opening; `None` where they bound none.
+    /// Whether one blocking polygon holds all of a lid.
+    fn is_covered(&self, lid: &[DVec3], plane: &Plane) -> bool {
+        let size = polygon::diameter(lid);
+        self.occluders.iter().any(|o| {
+            let tolerance = PLANARITY * (size + o.radius);
+            o.plane.normal.cross(plane.normal).length() * size <= tolerance
+                && lid.iter().all(|&c| o.plane.distance(c).abs() <= tolerance)
+                && polygon::edges(&o.corners).all(|(a, b)| {
+                    let inward = o.plane.normal.cross(b - a).normalize_or_zero();
+                    lid.iter().all(|&c| inward.dot(c - a) >= -tolerance)
+                })
+        })
+    }
+
+    /// The solid that the members bound, with at most one flat opening that nothing covers; `None` where they bound none.
     fn solid(&self, members: &BTreeSet<usize>) -> Option<Body> {
         if members.len() < 3 {
             return None;
@@ -192,16 +208,24 @@ impl<'a> Surface<'a> {
         let centre = polygon::mean_corner(&corners);
         let radius = corners.iter().map(|&c| (c - centre).length()).fold(0.0, f64::max);
         let tolerance = PLANARITY * radius;
-        if !open.is_empty() {
-            let lid = lid(&open)?;
-            let plane = Plane::of_polygon(&lid)?;
+        let lids = lids(&open)?;
+        let mut uncovered = 0;
+        for lid in &lids {
+            let plane = Plane::of_polygon(&lid.corners)?;
             let outside = corners.iter().any(|&c| plane.distance(c) > tolerance);
-            if outside || lid.iter().any(|&c| plane.distance(c).abs() > tolerance) {
+            if outside || lid.corners.iter().any(|&c| plane.distance(c).abs() > tolerance) {
                 return None;
             }
             let right = faces.len();
             faces.push(plane);
-            edges.extend(open.iter().map(|&(from, to, left)| BodyEdge { from, to, left, right }));
+            edges.extend(lid.edges.iter().map(|&k| {
+                let (from, to, left) = open[k];
+                BodyEdge { from, to, left, right }
+            }));
+            uncovered += usize::from(lids.len() > 1 && !self.is_covered(&lid.corners, &plane));
+        }
+        if uncovered > 1 {
+            return None;
         }
         // A flat patch with a lid of its own encloses nothing.
         let has_inside = faces.iter().all(|face| corners.iter().any(|&c| face.distance(c) < -tolerance));
@@ -209,23 +233,37 @@ impl<'a> Surface<'a> {
     }
 }
 
-/// The corners of the one loop that open edges make, as the missing face would run round it; `None` for anything else.
-fn lid(open: &[(DVec3, DVec3, usize)]) -> Option<Vec<DVec3>> {
-    let back: BTreeMap<Corner, DVec3> = open.iter().map(|&(from, to, _)| (key(to), from)).collect();
+/// A loop of open edges.
+struct Lid {
+    /// As the missing face would run round it.
+    corners: Vec<DVec3>,
+    /// Places of its edges among the open ones.
+    edges: Vec<usize>,
+}
+
+/// The loops that open edges make; `None` where they meet in a corner.
+fn lids(open: &[(DVec3, DVec3, usize)]) -> Option<Vec<Lid>> {
+    let back: BTreeMap<Corner, usize> =
+        open.iter().enumerate().map(|(k, &(_, to, _))| (key(to), k)).collect();
     if back.len() != open.len() {
         return None;
     }
-    let start = open[0].0;
-    let mut corners = vec![start];
-    let mut at = *back.get(&key(start))?;
-    while key(at) != key(start) {
-        if corners.len() > open.len() {
-            return None;
+    let mut taken = vec![false; open.len()];
+    let mut lids = Vec::new();
+    for start in 0..open.len() {
+        let mut lid = Lid { corners: Vec::new(), edges: Vec::new() };
+        let mut at = start;
+        while !taken[at] {
+            taken[at] = true;
+            lid.corners.push(open[at].0);
+            lid.edges.push(at);
+            at = *back.get(&key(open[at].0))?;
         }
-        corners.push(at);
-        at = *back.get(&key(at))?;
+        if !lid.edges.is_empty() {
+            lids.push(lid);
+        }
     }
-    (corners.len() == open.len()).then_some(corners)
+    Some(lids)
 }
 
 #[cfg(test)]
@@ -264,6 +302,24 @@ mod tests {
         assert_eq!(bodies(&room).len(), 6);
         assert!(bodies(&block[2..]).iter().all(Body::is_flat));
         assert!(bodies(&block[..1]).iter().all(Body::is_flat));
+    }
+
+    /// A leg without ends between a floor and a seat is a body; one between nothing is not.
+    #[test]
+    fn a_tube_between_two_faces_is_one_body() {
+        let leg = cuboid(DVec3::new(1.0, 1.0, 0.0), DVec3::new(1.1, 1.1, 1.0))[2..].to_vec();
+        let floor = cuboid(DVec3::ZERO, DVec3::new(3.0, 3.0, 1.0))[0].clone();
+        // One open end that nothing covers is allowed.
+        for seat_height in [1.0, 1.001] {
+            let seat = cuboid(DVec3::new(0.5, 0.5, seat_height), DVec3::new(2.0, 2.0, 1.1));
+            let mut all = vec![floor.clone()];
+            all.extend(leg.iter().chain(&seat).cloned());
+            let found = bodies(&all);
+            let legs = found.iter().filter(|b| !b.is_flat() && b.parts.len() == 4).count();
+            assert_eq!((legs, found.len()), (1, 3));
+        }
+        // Nothing beneath and nothing above.
+        assert!(bodies(&leg).iter().all(Body::is_flat));
     }
 
     #[test]

@@ -120,7 +120,8 @@ impl ElementTree {
         let size = (0..3).map(spread).fold(0.0, f64::max);
         let (mut axis, mut widest) = (0, f64::NEG_INFINITY);
         for candidate in 0..6 {
-            let extent = if candidate < 3 { spread(candidate) } else { DIRECTIONS * size * spread(candidate) };
+            let extent =
+                if candidate < 3 { spread(candidate) } else { DIRECTIONS * size * spread(candidate) };
             if extent > widest {
                 (axis, widest) = (candidate, extent);
             }
@@ -166,7 +167,8 @@ impl ElementTree {
             let (u, _) = plane.axes();
             let edges = members.iter().take(TRIED).flat_map(|&k| polygon::edges(self.corners(k)));
             let directions = edges.map(|(a, b)| (b - a).normalize_or_zero()).filter(|d| *d != DVec3::ZERO);
-            let boxes = std::iter::once(u).chain(directions).map(|u| boxed([u, plane.normal.cross(u), plane.normal]));
+            let boxes =
+                std::iter::once(u).chain(directions).map(|u| boxed([u, plane.normal.cross(u), plane.normal]));
             let size = |axes: &[DVec3; 3]| axes[0].length() * axes[1].length();
             boxes.min_by(|a, b| size(&a.1).total_cmp(&size(&b.1))).unwrap_or((corners[0], [DVec3::ZERO; 3]))
         } else {

@@ -7,10 +7,10 @@
 use crate::body::{Body, bodies};
 use crate::element_tree::{Element, ElementTree};
 use crate::occluder::Occluder;
-use crate::point_factor::point_factor;
-use crate::point_shadow::{Bounds, Candidate, Meets, PointShadows};
+use crate::point_factor::above_horizon;
+use crate::point_shadow::{Bounds, Candidate, Cone, Meets, PointShadows};
 use crate::polygon;
-use crate::visible_part::Pieces;
+use crate::visible_part::{Pieces, Polygons};
 use glam::DVec3;
 use std::ops::Range;
 
@@ -40,8 +40,8 @@ pub(crate) trait Taker {
     fn takes_node(&mut self, node: usize, to_point: Look) -> bool;
     /// Offers an element likewise.
     fn takes_element(&mut self, element: usize, to_point: Look) -> bool;
-    /// An element and its form factor, above 0.
-    fn take(&mut self, element: usize, factor: f64);
+    /// An element, and what is seen of it: convex pieces above the horizon, from the point as origin.
+    fn take(&mut self, element: usize, seen: &Polygons, look: Look);
     /// A cluster proved to be wholly behind one body.
     fn hidden(&mut self) {}
 }
@@ -67,8 +67,11 @@ impl Taker for Every<'_> {
     fn takes_element(&mut self, _: usize, _: Look) -> bool {
         false
     }
-    fn take(&mut self, element: usize, factor: f64) {
-        self.1(self.0[element].index, factor);
+    fn take(&mut self, element: usize, seen: &Polygons, look: Look) {
+        let factor: f64 = seen.iter().map(|piece| above_horizon(DVec3::ZERO, look.normal, piece)).sum();
+        if factor > 0.0 {
+            self.1(self.0[element].index, factor);
+        }
     }
 }
 
@@ -123,8 +126,9 @@ impl Gatherer {
 
         // Pass on the shadows that may touch this cluster; one may take all of it.
         let start = scratch.candidates.len();
+        let cone = Cone::around(bounds.centre, bounds.radius);
         for at in list {
-            match scratch.shadows.narrow(scratch.candidates[at], &bounds) {
+            match scratch.shadows.narrow(scratch.candidates[at], &bounds, &cone) {
                 Meets::Nothing => {}
                 Meets::Part(candidate) => scratch.candidates.push(candidate),
                 Meets::Everything if look.hidden => {
@@ -178,23 +182,14 @@ impl Gatherer {
         if is_free && low >= 0.0 && taker.takes_element(k, look) {
             return;
         }
-        let factor = if is_free {
-            point_factor(look.point, look.normal, corners, cut).max(0.0)
-        } else {
-            // The element above the horizon, seen from the point as origin.
-            if low >= 0.0 {
-                seen.clear();
-                seen.extend(corners.iter().map(|&c| c - look.point));
-            } else {
-                cut.clear();
-                cut.extend(corners.iter().map(|&c| c - look.point));
-                polygon::clip_by(cut, |r| look.normal.dot(r), seen);
-            }
-            pieces.visible(seen, candidates[list].iter().copied(), shadows, look.normal)
-        };
-        if factor > 0.0 {
-            taker.take(k, factor);
+        // The element above the horizon, seen from the point as origin.
+        cut.clear();
+        cut.extend(corners.iter().map(|&c| c - look.point));
+        if low < 0.0 {
+            polygon::clip_by(cut, |r| look.normal.dot(r), seen);
+            std::mem::swap(cut, seen);
         }
+        taker.take(k, pieces.visible(cut, &candidates[list], shadows), look);
     }
 }
 

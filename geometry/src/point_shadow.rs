@@ -30,6 +30,36 @@ struct Shadow {
     spaces: Range<usize>,
     /// Size of the body.
     radius: f64,
+    /// Cone around the body.
+    cone: Cone,
+}
+
+/// A cone of directions that holds all of a ball: within an angle, given by its cosine and sine, of `direction`.
+#[derive(Debug, Clone, Copy)]
+pub struct Cone {
+    direction: DVec3,
+    cosine: f64,
+    sine: f64,
+}
+
+impl Cone {
+    /// Cone around a ball whose centre is seen at `to_centre`; all directions where the point is inside.
+    pub fn around(to_centre: DVec3, radius: f64) -> Cone {
+        let distance = to_centre.length();
+        if radius >= distance {
+            return Cone { direction: DVec3::ZERO, cosine: -1.0, sine: 0.0 };
+        }
+        let sine = radius / distance;
+        Cone { direction: to_centre / distance, cosine: (1.0 - sine * sine).sqrt(), sine }
+    }
+
+    /// Whether two cones may share a direction: cos of the angle between against cos of the sum of the half angles. A cone
+    /// of all directions meets any.
+    fn may_meet(&self, other: &Cone) -> bool {
+        self.cosine < 0.0
+            || other.cosine < 0.0
+            || self.direction.dot(other.direction) >= self.cosine * other.cosine - self.sine * other.sine
+    }
 }
 
 /// A box around a cluster, seen from the point: all points `centre` + sum of t_k `axes`_k, -1 <= t_k <= 1.
@@ -102,6 +132,10 @@ impl PointShadows {
             return;
         }
         let start = self.spaces.len();
+        // Front faces first: a cluster nearer than the body fails there at once.
+        for (face, _) in body.faces.iter().zip(&self.fronts).filter(|(_, front)| **front) {
+            self.spaces.push(HalfSpace { normal: -face.normal, offset: -face.distance(point) });
+        }
         for edge in &body.edges {
             let left = self.fronts[edge.left];
             if left != self.fronts[edge.right] {
@@ -109,15 +143,16 @@ impl PointShadows {
                 self.spaces.push(HalfSpace { normal: if left { -across } else { across }, offset: 0.0 });
             }
         }
-        for (face, _) in body.faces.iter().zip(&self.fronts).filter(|(_, front)| **front) {
-            self.spaces.push(HalfSpace { normal: -face.normal, offset: -face.distance(point) });
-        }
-        self.shadows.push(Shadow { spaces: start..self.spaces.len(), radius: body.radius });
+        let cone = Cone::around(body.centre - point, body.radius);
+        self.shadows.push(Shadow { spaces: start..self.spaces.len(), radius: body.radius, cone });
     }
 
-    /// How the shadow of a candidate for a larger cluster meets a box inside that cluster.
-    pub fn narrow(&self, candidate: Candidate, bounds: &Bounds) -> Meets {
+    /// How the shadow of a candidate for a larger cluster meets a box inside that cluster; `cone` is one around the box.
+    pub fn narrow(&self, candidate: Candidate, bounds: &Bounds, cone: &Cone) -> Meets {
         let shadow = &self.shadows[candidate.shadow as usize];
+        if !shadow.cone.may_meet(cone) {
+            return Meets::Nothing;
+        }
         let tolerance = PLANARITY * (shadow.radius + bounds.radius);
         let mut across = candidate.across;
         let mut all_inside = true;
@@ -180,13 +215,15 @@ mod tests {
     #[test]
     fn boxes_are_hidden_untouched_or_across_at_any_scale() {
         for scale in [1e-6, 1.0, 1e6] {
-            let block = bodies(&cuboid(scale * DVec3::new(-1.0, -1.0, 1.0), scale * DVec3::new(1.0, 1.0, 2.0)));
+            let block =
+                bodies(&cuboid(scale * DVec3::new(-1.0, -1.0, 1.0), scale * DVec3::new(1.0, 1.0, 2.0)));
             let mut shadows = PointShadows::default();
             shadows.look(DVec3::ZERO, DVec3::Z, &block);
             let candidate = shadows.all().next().unwrap();
             let meets = |x: f64, z: f64, half: f64| {
                 let place = scale * DVec3::new(x, 0.0, z);
-                shadows.narrow(candidate, &at(DVec3::ZERO, place, scale * half))
+                let bounds = at(DVec3::ZERO, place, scale * half);
+                shadows.narrow(candidate, &bounds, &Cone::around(bounds.centre, bounds.radius))
             };
             assert_eq!(meets(0.0, 4.0, 0.5), Meets::Everything);
             assert_eq!(meets(5.0, 4.0, 0.5), Meets::Nothing);

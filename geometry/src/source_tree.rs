@@ -10,6 +10,9 @@
 use crate::element_tree::{Element, ElementTree, Node};
 use crate::gather::{Gatherer, Look, Scratch, Taker};
 use crate::plane::Plane;
+use crate::point_factor::above_horizon;
+use crate::polygon;
+use crate::visible_part::Polygons;
 use glam::DVec3;
 use std::f64::consts::FRAC_1_PI;
 
@@ -17,13 +20,21 @@ use std::f64::consts::FRAC_1_PI;
 #[derive(Debug)]
 pub struct SourceTree<const N: usize> {
     gatherer: Gatherer,
-    /// Strength of each of the gatherer's elements.
+    /// Strength of each of the gatherer's elements, at its centroid.
     strengths: Vec<[f64; N]>,
+    /// Slopes of those elements whose strength changes, and the steepest of each.
+    slopes: Vec<Option<(f64, Slope<N>)>>,
     /// Of each of the gatherer's elements.
     element_sources: Vec<Source<N>>,
     /// Of each node of the gatherer's tree.
     node_sources: Vec<NodeSource<N>>,
 }
+
+/// How strength changes over a source: its gradient in the source's plane, one for each of the N numbers.
+pub type Slope<const N: usize> = [DVec3; N];
+
+/// Cuts in a row of what is seen of a source that is not even: each halves the doubt about where its mean is.
+const MOST_CUTS: u32 = 24;
 
 /// Sources in one plane, as they look from afar.
 #[derive(Debug, Clone)]
@@ -46,6 +57,8 @@ struct NodeSource<const N: usize> {
 #[derive(Debug, Clone)]
 struct Moments<const N: usize> {
     axes: [DVec3; 2],
+    /// Largest strength times area, over pi.
+    size: f64,
     /// Strength times area.
     zeroth: [f64; N],
     first: [[f64; N]; 2],
@@ -64,35 +77,90 @@ pub struct Counts {
     pub hidden: u64,
 }
 
+/// Radius over distance from which on the series is not to be trusted, however small the share.
+const WIDEST: f64 = 0.5;
+/// Remainder of the series over the cube of radius over distance and the share.
+const REMAINDER: f64 = 10.0;
+
 /// What may be left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Opening {
     /// Flat unblocked clusters are counted by their moments where radius over distance is below this; 0 for never.
     pub far: f64,
+    /// What a source's share may be off by, in the unit of the strengths: sources that change are cut only while the place
+    /// of what is seen of them is in doubt by more, and clusters whose share is small count by their moments earlier.
+    pub blur: f64,
     /// Whether clusters behind one blocker are recognised as such.
     pub hidden: bool,
 }
 
 impl Opening {
     /// Everything exactly; only what is proved to give nothing is left out.
-    pub const EXACT: Opening = Opening { far: 0.0, hidden: true };
+    pub const EXACT: Opening = Opening { far: 0.0, blur: 0.0, hidden: true };
 }
 
 /// Adds up what a walk finds.
 struct Sum<'a, const N: usize> {
     tree: &'a SourceTree<N>,
-    far: f64,
+    opening: Opening,
     sum: [f64; N],
     counts: Counts,
 }
 
+/// A source whose strength changes.
+struct Uneven<'a, const N: usize> {
+    to_centre: DVec3,
+    strength: &'a [f64; N],
+    slope: &'a Slope<N>,
+    steepest: f64,
+}
+
 impl<const N: usize> Sum<'_, N> {
+    /// Adds a piece of a source whose strength changes: what it sends is its form factor times the strength at its mean by
+    /// the kernel. That is close to its centroid where the kernel changes little; otherwise it is cut in two.
+    fn add_uneven(&mut self, piece: &[DVec3], source: &Uneven<'_, N>, normal: DVec3, cuts: u32) {
+        let factor = above_horizon(DVec3::ZERO, normal, piece);
+        if piece.len() < 3 || factor <= 0.0 {
+            return;
+        }
+        let centroid = polygon::centroid(piece);
+        let farthest = |far: DVec3, &corner: &DVec3| {
+            let from_centre = corner - centroid;
+            if from_centre.length_squared() > far.length_squared() { from_centre } else { far }
+        };
+        let far = piece.iter().fold(DVec3::ZERO, farthest);
+        let radius = far.length();
+        // The kernel's logarithm changes by about 4 / r, and by 1 / height over the horizon; moments are below R^2 / 4.
+        let change = 1.0 / centroid.length() + 0.25 / normal.dot(centroid);
+        let doubt = (radius * change).min(1.0) * radius * source.steepest * factor;
+        if doubt > self.opening.blur && cuts < MOST_CUTS {
+            let heights: Vec<f64> = piece.iter().map(|&corner| far.dot(corner - centroid)).collect();
+            let (mut front, mut back) = (Vec::new(), Vec::new());
+            polygon::cut_in_two(piece, &heights, &mut front, &mut back);
+            self.add_uneven(&front, source, normal, cuts + 1);
+            self.add_uneven(&back, source, normal, cuts + 1);
+            return;
+        }
+        let aside = centroid - source.to_centre;
+        for (n, sum) in self.sum.iter_mut().enumerate() {
+            *sum += factor * (source.strength[n] + source.slope[n].dot(aside));
+        }
+    }
+
     /// Adds sources by their moments, if they are far enough.
     fn takes(&mut self, source: &Source<N>, look: Look) -> bool {
         let to_centre = source.centre - look.point;
         let height = look.normal.dot(to_centre);
-        let is_far = height >= source.radius
-            && source.radius * source.radius < self.far * self.far * to_centre.length_squared();
+        let squared = to_centre.length_squared();
+        let ratio_squared = source.radius * source.radius / squared;
+        if height < source.radius || ratio_squared >= WIDEST * WIDEST {
+            return false;
+        }
+        let Opening { far, blur, .. } = self.opening;
+        let is_far = ratio_squared < far * far || {
+            let share = -source.normal.dot(to_centre) * height / (squared * squared) * source.moments.size;
+            REMAINDER * ratio_squared * ratio_squared.sqrt() * share < blur
+        };
         if is_far {
             source.moments.add_to(&mut self.sum, to_centre, source.normal, look.normal);
             self.counts.far += 1;
@@ -116,10 +184,23 @@ impl<const N: usize> Taker for Sum<'_, N> {
         self.takes(&tree.element_sources[element], look)
     }
 
-    fn take(&mut self, element: usize, factor: f64) {
+    fn take(&mut self, element: usize, seen: &Polygons, look: Look) {
         self.counts.exact += 1;
-        for (sum, strength) in self.sum.iter_mut().zip(&self.tree.strengths[element]) {
-            *sum += factor * strength;
+        let tree = self.tree;
+        let strength = &tree.strengths[element];
+        match &tree.slopes[element] {
+            None => {
+                let normal = look.normal;
+                let factor: f64 = seen.iter().map(|piece| above_horizon(DVec3::ZERO, normal, piece)).sum();
+                for (sum, strength) in self.sum.iter_mut().zip(strength) {
+                    *sum += factor.max(0.0) * strength;
+                }
+            }
+            Some((steepest, slope)) => {
+                let to_centre = tree.gatherer.tree.elements[element].centroid - look.point;
+                let uneven = Uneven { to_centre, strength, slope, steepest: *steepest };
+                seen.iter().for_each(|piece| self.add_uneven(piece, &uneven, look.normal, 0));
+            }
         }
     }
 
@@ -131,18 +212,34 @@ impl<const N: usize> Taker for Sum<'_, N> {
 impl<const N: usize> SourceTree<N> {
     /// Prepares the elements of `gatherer`, with `strengths` in the order they were given to it.
     pub fn new(gatherer: Gatherer, strengths: &[[f64; N]]) -> SourceTree<N> {
+        SourceTree::with_slopes(gatherer, strengths, &[])
+    }
+
+    /// As [`SourceTree::new`], with strengths that change over the elements: those given hold at their centroids.
+    pub fn with_slopes(
+        gatherer: Gatherer,
+        strengths: &[[f64; N]],
+        slopes: &[Option<Slope<N>>],
+    ) -> SourceTree<N> {
         let tree = &gatherer.tree;
+        let with_steepest = |slope: Slope<N>| {
+            let steepest = slope.iter().fold(0.0, |most: f64, s| most.max(s.length()));
+            (steepest > 0.0).then_some((steepest, slope))
+        };
+        let slope = |element: &Element| slopes.get(element.index).copied().flatten().and_then(with_steepest);
+        let slopes: Vec<Option<(f64, Slope<N>)>> = tree.elements.iter().map(slope).collect();
         let strength = |element: &Element| strengths.get(element.index).copied().unwrap_or([0.0; N]);
         let strengths: Vec<[f64; N]> = tree.elements.iter().map(strength).collect();
         let element_sources = (0..tree.elements.len()).map(|k| {
             let Element { plane, centroid, radius, .. } = tree.elements[k];
             let mut moments = Moments::none(&plane);
-            moments.add(tree.corners(k), &plane, &strengths[k], centroid);
+            moments.add(tree.corners(k), &plane, (&strengths[k], centroid), &slopes[k], centroid);
             Source { centre: centroid, radius, normal: plane.normal, moments }
         });
         let element_sources = element_sources.collect();
-        let node_sources = tree.nodes.iter().map(|node| NodeSource::new(tree, node, &strengths)).collect();
-        SourceTree { gatherer, strengths, element_sources, node_sources }
+        let node_sources =
+            tree.nodes.iter().map(|node| NodeSource::new(tree, node, &strengths, &slopes)).collect();
+        SourceTree { gatherer, strengths, slopes, element_sources, node_sources }
     }
 
     /// Sum over the elements of form factor times strength, at `point` on a plane with unit `normal`; and how it was found.
@@ -157,23 +254,32 @@ impl<const N: usize> SourceTree<N> {
         opening: Opening,
         scratch: &mut Scratch,
     ) -> ([f64; N], Counts) {
-        let mut sum = Sum { tree: self, far: opening.far, sum: [0.0; N], counts: Counts::default() };
+        let mut sum = Sum { tree: self, opening, sum: [0.0; N], counts: Counts::default() };
         self.gatherer.walk(Look { point, normal, hidden: opening.hidden }, scratch, &mut sum);
         (sum.sum, sum.counts)
     }
 }
 
 impl<const N: usize> NodeSource<N> {
-    fn new(tree: &ElementTree, node: &Node, strengths: &[[f64; N]]) -> NodeSource<N> {
+    fn new(
+        tree: &ElementTree,
+        node: &Node,
+        strengths: &[[f64; N]],
+        slopes: &[Option<(f64, Slope<N>)>],
+    ) -> NodeSource<N> {
         let lit = tree.members(node).any(|k| strengths[k].iter().any(|&s| s != 0.0));
         let flat = node.plane.filter(|_| lit).map(|plane| {
             let area: f64 = tree.members(node).map(|k| tree.elements[k].area).sum();
-            let weighted: DVec3 = tree.members(node).map(|k| tree.elements[k].area * tree.elements[k].centroid).sum();
+            let weighted: DVec3 =
+                tree.members(node).map(|k| tree.elements[k].area * tree.elements[k].centroid).sum();
             let centre = weighted / area;
             let corners = tree.members(node).flat_map(|k| tree.corners(k));
             let radius = corners.map(|corner| corner.distance(centre)).fold(0.0, f64::max);
             let mut moments = Moments::none(&plane);
-            tree.members(node).for_each(|k| moments.add(tree.corners(k), &plane, &strengths[k], centre));
+            for k in tree.members(node) {
+                let strength = (&strengths[k], tree.elements[k].centroid);
+                moments.add(tree.corners(k), &plane, strength, &slopes[k], centre);
+            }
             Source { centre, radius, normal: plane.normal, moments }
         });
         NodeSource { lit, flat }
@@ -183,12 +289,20 @@ impl<const N: usize> NodeSource<N> {
 impl<const N: usize> Moments<N> {
     fn none(plane: &Plane) -> Moments<N> {
         let (u, v) = plane.axes();
-        Moments { axes: [u, v], zeroth: [0.0; N], first: [[0.0; N]; 2], second: [[0.0; N]; 3] }
+        Moments { axes: [u, v], size: 0.0, zeroth: [0.0; N], first: [[0.0; N]; 2], second: [[0.0; N]; 3] }
     }
 
-    /// Adds a polygon of even strength: over a triangle with corners u_i, of area A, u has the mean of the corners and
-    /// u v the integral A / 12 (sum u_i v_i + sum u_i sum v_i).
-    fn add(&mut self, polygon: &[DVec3], plane: &Plane, strength: &[f64; N], centre: DVec3) {
+    /// Adds a polygon of the given strength at its centroid, even or with a slope: over a triangle with corners u_i, of area
+    /// A, u has the mean of the corners and u v the integral A / 12 (sum u_i v_i + sum u_i sum v_i). With a slope, third
+    /// moments about the centroid are left out, as the series leaves them out.
+    fn add(
+        &mut self,
+        polygon: &[DVec3],
+        plane: &Plane,
+        (strength, centroid): (&[f64; N], DVec3),
+        slope: &Option<(f64, Slope<N>)>,
+        centre: DVec3,
+    ) {
         let (mut area, mut first, mut second) = (0.0, [0.0; 2], [0.0; 3]);
         for k in 2..polygon.len() {
             let corners = [polygon[0], polygon[k - 1], polygon[k]];
@@ -206,7 +320,21 @@ impl<const N: usize> Moments<N> {
             self.zeroth[n] += s * area;
             (0..2).for_each(|c| self.first[c][n] += s * first[c]);
             (0..3).for_each(|c| self.second[c][n] += s * second[c]);
+            if let Some((_, slope)) = slope {
+                // Moments of the change: (second moments about the centroid) times the slope, and its products with the shift.
+                let shift = self.axes.map(|axis| axis.dot(centroid - centre));
+                let g = self.axes.map(|axis| axis.dot(slope[n]));
+                let about = |at: usize, a: usize, b: usize| second[at] - area * shift[a] * shift[b];
+                let (uu, vv, uv) = (about(0, 0, 0), about(1, 1, 1), about(2, 0, 1));
+                let change = [uu * g[0] + uv * g[1], uv * g[0] + vv * g[1]];
+                (0..2).for_each(|c| self.first[c][n] += change[c]);
+                self.second[0][n] += 2.0 * change[0] * shift[0];
+                self.second[1][n] += 2.0 * change[1] * shift[1];
+                self.second[2][n] += change[0] * shift[1] + change[1] * shift[0];
+            }
         }
+        let brightest = self.zeroth.iter().fold(0.0, |most: f64, z| most.max(z.abs()));
+        self.size = FRAC_1_PI * brightest;
     }
 
     /// Adds the integral of the kernel times the sources. Over the sources' plane the kernel is h a / (pi r^4), with h the
@@ -294,15 +422,16 @@ mod tests {
                 exact.factors(point, normal, scratch, &mut |k, factor| {
                     (0..2).for_each(|c| want[c] += factor * strengths[k][c]);
                 });
-                for (far, allowed) in [(0.0, 1e-12), (0.1, 2e-5), (0.2, 2e-4), (0.4, 2e-3)] {
-                    let opening = Opening { far, hidden: true };
+                for (far, allowed) in [(0.0, 1e-12), (0.1, 2e-5), (0.2, 2e-4), (0.4, 3e-3)] {
+                    let opening = Opening { far, blur: 0.0, hidden: true };
                     let (got, count) = tree.gather(point, normal, opening, scratch);
                     for (got, want) in got.iter().zip(want) {
                         let error = (got / want - 1.0).abs();
                         assert!(error < allowed, "{point} {far}: {got} {want} {error:.1e}");
                     }
                     counts = [count.exact, count.far, count.hidden];
-                    let (all, count) = tree.gather(point, normal, Opening { far, hidden: false }, scratch);
+                    let (all, count) =
+                        tree.gather(point, normal, Opening { far, blur: 0.0, hidden: false }, scratch);
                     assert_eq!(count.hidden, 0);
                     assert!(all.iter().zip(got).all(|(a, b)| (a / b - 1.0).abs() < 1e-12));
                 }

@@ -13,7 +13,7 @@ use std::ops::Range;
 
 /// Convex polygons in one flat array, reused from call to call.
 #[derive(Debug, Clone, Default)]
-struct Polygons {
+pub(crate) struct Polygons {
     points: Vec<DVec3>,
     ends: Vec<usize>,
 }
@@ -31,7 +31,7 @@ impl Polygons {
         }
     }
 
-    fn iter(&self) -> impl Iterator<Item = &[DVec3]> {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &[DVec3]> {
         let starts = std::iter::once(&0).chain(&self.ends);
         starts.zip(&self.ends).map(|(&start, &end)| &self.points[start..end])
     }
@@ -49,24 +49,22 @@ pub struct Pieces {
 }
 
 impl Pieces {
-    /// Form factor from a surface element with unit `normal` to a convex polygon, given from that element's point on and
-    /// above its horizon, as far as the shadows of the `candidates` leave it in sight.
+    /// What the shadows of the `candidates` leave in sight of a convex polygon that is given from the point.
     pub(crate) fn visible(
         &mut self,
         corners: &[DVec3],
-        candidates: impl Iterator<Item = Candidate>,
+        candidates: &[Candidate],
         shadows: &PointShadows,
-        normal: DVec3,
-    ) -> f64 {
+    ) -> &Polygons {
         self.start(corners.iter().copied());
-        for candidate in candidates {
+        for &candidate in candidates {
             shadows.half_spaces(candidate, &mut self.half_spaces);
             self.subtract();
             if self.pieces.ends.is_empty() {
-                return 0.0;
+                break;
             }
         }
-        self.factor(normal)
+        &self.pieces
     }
 
     fn start(&mut self, corners: impl Iterator<Item = DVec3>) {

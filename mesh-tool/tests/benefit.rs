@@ -3,9 +3,9 @@
 
 mod common;
 use common::*;
+use geometry::gather::{Gatherer, Scratch};
 use geometry::occluder::Occluder;
 use geometry::polygon;
-use geometry::gather::{Gatherer, Scratch};
 use glam::DVec3;
 use interchange::mesh::Mesh;
 use mesh_tool::Options;

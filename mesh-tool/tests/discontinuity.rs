@@ -3,8 +3,8 @@
 
 mod common;
 use common::*;
-use geometry::occluder::Occluder;
 use geometry::gather::{Gatherer, Scratch};
+use geometry::occluder::Occluder;
 use glam::DVec3;
 use interchange::report::Report;
 use interchange::scene::Scene;

@@ -11,7 +11,7 @@ use crate::picture::Picture;
 use crate::refined::Scheme;
 use crate::render::{Quality, Renderer};
 use crate::skips::Skip;
-use crate::{TOOL, VERSION, grid, info, points, preview, probe, skips};
+use crate::{TOOL, VERSION, bounces, grid, info, points, preview, probe, skips};
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 use glam::DVec3;
@@ -130,6 +130,9 @@ pub struct RenderArguments {
     /// Layers to store besides radiance
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub layers: Vec<Layer>,
+    /// Solutions after 0, 1, 2 ... bounces (solve-tool solve --bounces): layers bounces.0 to bounces.K, K solutions of them
+    #[arg(long, value_name = "B0.SOL,...", value_delimiter = ',')]
+    pub bounces: Vec<PathBuf>,
     /// Lumens per watt, for the white luminance that the EXR states (179: equal-energy white)
     #[arg(long, value_name = "LM/W", default_value_t = 179.0, value_parser = positive)]
     pub efficacy: f64,
@@ -187,13 +190,13 @@ pub struct ProbeArguments {
     #[arg(long, value_name = "FACE|GROUP", requires = "spacing")]
     pub grid: Option<String>,
     /// Largest distance of the grid's points, in the scene's unit
-    #[arg(long, value_name = "D", value_parser = positive, requires = "grid")]
+    #[arg(long, value_name = "D", value_parser = positive, requires = "grid", conflicts_with = "points")]
     pub spacing: Option<f64>,
     /// Height of the grid above its faces, in the scene's unit
-    #[arg(long, value_name = "H", default_value_t = 0.0, value_parser = not_negative, requires = "grid")]
+    #[arg(long, value_name = "H", default_value_t = 0.0, value_parser = not_negative, requires = "grid", conflicts_with = "points")]
     pub height: f64,
     /// Lumens per watt, for the illuminance of the grid's summary (179: equal-energy white)
-    #[arg(long, value_name = "LM/W", default_value_t = 179.0, value_parser = positive, requires = "grid")]
+    #[arg(long, value_name = "LM/W", default_value_t = 179.0, value_parser = positive, requires = "grid", conflicts_with = "points")]
     pub efficacy: f64,
     /// Add the column H_error, the estimated error at each point (a grid has it always)
     #[arg(long)]
@@ -225,6 +228,10 @@ impl Arguments {
         if let (Some(layer), Interpolation::Constant) = (apart, render.interpolation) {
             let message =
                 format!("--interpolation constant knows no {} layer: nothing is gathered", layer.name());
+            return Err(Arguments::command().error(ErrorKind::ArgumentConflict, message));
+        }
+        if !render.bounces.is_empty() && render.interpolation == Interpolation::Constant {
+            let message = "--interpolation constant knows no layers of --bounces: nothing is gathered";
             return Err(Arguments::command().error(ErrorKind::ArgumentConflict, message));
         }
         Ok(())
@@ -260,6 +267,15 @@ fn run_render(arguments: &RenderArguments, common: &Common) -> Result<()> {
         .flag(if arguments.float { "--float" } else { "--half" });
     let provenance = skips::sign(&arguments.scene.no_skip, provenance);
     let provenance = scene.sign(provenance);
+    let by_bounces = bounces::scenes(&arguments.bounces, &arguments.scene, drawn, &mut report)?;
+    // The first of them is the second one in the dark.
+    let provenance = by_bounces.iter().skip(1).fold(provenance, |p, scene| {
+        scene
+            .inputs
+            .iter()
+            .filter(|(role, _)| *role == "solution")
+            .fold(p, |p, &(_, d)| p.input("bounces", d))
+    });
     report.flags.clone_from(&provenance.flags);
 
     let quality = Quality {
@@ -268,10 +284,22 @@ fn run_render(arguments: &RenderArguments, common: &Common) -> Result<()> {
         tolerance: arguments.tolerance,
         layers: arguments.layers.clone(),
     };
-    let opening = skips::opening(&arguments.scene.no_skip, Some(arguments.tolerance));
+    let opening =
+        skips::opening(&arguments.scene.no_skip, Some(arguments.tolerance), scene.mean_irradiance());
     let mut renderer = Renderer::new(&scene, opening, &mut report);
+    // What these count is not the picture's.
+    let mut aside = Report::new(TOOL, VERSION);
+    let mut bounce_renderers: Vec<Renderer<'_>> =
+        by_bounces.iter().map(|scene| Renderer::new(scene, opening, &mut aside)).collect();
     for frame in &frames {
-        let picture = renderer.render(&frame.camera, &quality, common, &mut report);
+        let mut picture = renderer.render(&frame.camera, &quality, common, &mut report);
+        picture.bounces = report.phase("bounces", || {
+            let plain = Quality { layers: Vec::new(), ..quality.clone() };
+            let render = |renderer: &mut Renderer<'_>| {
+                renderer.render(&frame.camera, &plain, common, &mut aside).pixels
+            };
+            bounce_renderers.iter_mut().map(render).collect()
+        });
         warn_of_range(&picture, precision, &mut report);
         let provenance = provenance.clone().flag(format!("camera {}", frame.camera.describe()));
         report.flags.push(format!("camera {}", frame.camera.describe()));
@@ -335,7 +363,7 @@ fn run_probe(arguments: &ProbeArguments, common: &Common) -> Result<()> {
     let grid = arguments.grid.as_ref().zip(arguments.spacing).map(of_grid).transpose()?;
     let with_error = arguments.errors || grid.is_some();
     let points = table.or_else(|| grid.clone()).unwrap_or_default();
-    let opening = skips::opening(&files.no_skip, None);
+    let opening = skips::opening(&files.no_skip, None, 0.0);
     let probed = probe::probe(&scene, &points, opening, common, &mut report);
     report.phase("write", || probe::write(output, &points, &probed, with_error))?;
     if grid.is_some() {

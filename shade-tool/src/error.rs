@@ -27,6 +27,16 @@ pub enum Error {
         /// What to do.
         remedy: String,
     },
+    /// A solution that cannot serve as the one after so many bounces.
+    #[error("{}: {found}; {remedy}", path.display())]
+    Bounces {
+        /// The solution.
+        path: PathBuf,
+        /// What it is.
+        found: String,
+        /// What to do.
+        remedy: String,
+    },
     /// An EXR file that the decoder refuses.
     #[error("{}: not a readable OpenEXR file: {found}; remake it with shade-tool render", path.display())]
     Picture {

@@ -87,6 +87,12 @@ pub fn write(path: &Path, picture: &Picture, precision: Precision, label: &Label
     for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
         list.push(AnyChannel::new(text(name), stored(&mut picture.pixels.iter().map(|p| p[c]), precision)));
     }
+    for (k, pixels) in picture.bounces.iter().enumerate() {
+        for (c, name) in ["R", "G", "B"].into_iter().enumerate() {
+            let name = text(&format!("bounces.{k}.{name}"));
+            list.push(AnyChannel::new(name, stored(&mut pixels.iter().map(|p| p[c]), precision)));
+        }
+    }
     for (layer, values) in &picture.layers {
         // A half has 11 bits: depths of a millimetre in two metres.
         let precision = if *layer == PictureLayer::Depth { Precision::Float } else { precision };

@@ -11,6 +11,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod bounces;
 pub mod camera;
 pub mod coarser;
 pub mod command_line;
@@ -23,6 +24,7 @@ pub mod frames;
 pub mod grid;
 pub mod info;
 pub mod interpolation;
+pub mod joined;
 pub mod layers;
 pub mod lit_scene;
 pub mod node_places;

@@ -89,6 +89,17 @@ impl LitScene {
         corners.fold(empty, |(low, high), p| (low.min(p), high.max(p)))
     }
 
+    /// Irradiance, W m^-2, mean over the elements' area and the channels.
+    pub fn mean_irradiance(&self) -> f64 {
+        let (mut power, mut area) = (0.0, 0.0);
+        for (corners, irradiance) in self.sources.iter().zip(&self.irradiance) {
+            let own = geometry::polygon::area(corners);
+            power += own * irradiance.iter().sum::<f64>() / 3.0;
+            area += own;
+        }
+        if area > 0.0 { power / area } else { 0.0 }
+    }
+
     /// Length of the diagonal of the faces' bounding box.
     pub fn diagonal(&self) -> f64 {
         let (low, high) = self.bounds();

@@ -18,6 +18,8 @@ pub struct Picture {
     pub pixels: Vec<[f64; 3]>,
     /// Layers, each as large as the picture, in the order of their names.
     pub layers: Vec<(Layer, Values)>,
+    /// Radiance, pixel by pixel, by light reflected at most 0, 1, ... times.
+    pub bounces: Vec<Vec<[f64; 3]>>,
 }
 
 impl Picture {

@@ -2,6 +2,7 @@
 
 use crate::coarser::coarser_radiosity;
 use crate::error::Result;
+use crate::joined::Sources;
 use crate::lit_scene::LitScene;
 use crate::on_surface::Surfaces;
 use crate::points::{COLUMNS, ProbePoint};
@@ -76,7 +77,7 @@ fn light(scene: &LitScene, opening: Opening) -> Light {
     let both =
         |(fine, coarse): (&[f64; 3], &[f64; 3])| [fine[0], fine[1], fine[2], coarse[0], coarse[1], coarse[2]];
     let strengths: Vec<[f64; 6]> = scene.radiosity.iter().zip(&coarse).map(both).collect();
-    Light::with_strengths(scene, &strengths, opening)
+    Light::with_sources(scene, Sources::elements(scene, &strengths), opening)
 }
 
 /// Emitted power over area, brightest channel, W m^-2: what the solver's bound is a part of.

@@ -1,6 +1,7 @@
 //! Irradiance at a point of space or of a surface: H = sum over j of F_j B_j, with the exact form factor F_j of the
 //! visible part of element j.
 
+use crate::joined::Sources;
 use crate::lit_scene::LitScene;
 use geometry::gather::{Gatherer, Scratch};
 use geometry::merge::merged_occluders;
@@ -42,6 +43,10 @@ pub fn total(parts: &Parts) -> [f64; 3] {
     std::array::from_fn(|c| parts[c] + parts[c + 3])
 }
 
+/// What a source's elements may deviate from it, in units of what its share may be off by: the form factors of all of
+/// them together are 1, and deviations have both signs.
+const JOINED: f64 = 60.0;
+
 /// Everything that can light a point.
 #[derive(Debug)]
 pub struct Light {
@@ -49,6 +54,8 @@ pub struct Light {
     opening: Opening,
     /// Elements by exact factors, clusters by moments, clusters hidden, in this order.
     tally: [AtomicU64; 3],
+    /// Elements less sources.
+    joined: usize,
 }
 
 impl Light {
@@ -63,16 +70,24 @@ impl Light {
             strengths[source as usize] =
                 std::array::from_fn(|c| if c < 3 { emitted[c] } else { radiosity[c - 3] - emitted[c - 3] });
         }
-        Light::with_strengths(scene, &strengths, opening)
+        let sources = if opening.blur > 0.0 {
+            Sources::joined(scene, &strengths, JOINED * opening.blur)
+        } else {
+            Sources::elements(scene, &strengths)
+        };
+        Light::with_sources(scene, sources, opening)
     }
 
     /// Sources whose six numbers may be something else than [`Parts`].
-    pub fn with_strengths(scene: &LitScene, strengths: &[[f64; 6]], opening: Opening) -> Light {
+    pub fn with_sources(scene: &LitScene, sources: Sources, opening: Opening) -> Light {
         let mesh = &scene.mesh;
         let pieces = mesh.occluders.rows().map(|row| row.iter().map(|v| v.0).collect()).collect();
         let positions: Vec<DVec3> = mesh.vertices.iter().copied().map(DVec3::from_array).collect();
-        let gatherer = Gatherer::new(merged_occluders(pieces, &positions), scene.sources.clone());
-        Light { tree: SourceTree::new(gatherer, strengths), opening, tally: Default::default() }
+        let Sources { polygons, strengths, slopes } = sources;
+        let count = polygons.len();
+        let gatherer = Gatherer::new(merged_occluders(pieces, &positions), polygons);
+        let tree = SourceTree::with_slopes(gatherer, &strengths, &slopes);
+        Light { tree, opening, tally: Default::default(), joined: scene.sources.len().saturating_sub(count) }
     }
 
     /// Irradiance by its parts.
@@ -86,6 +101,7 @@ impl Light {
 
     /// Tells how sources were counted so far.
     pub fn count(&self, report: &mut Report) {
+        report.count("elements_joined_skipped", self.joined);
         for (name, sum) in ["sources_exact", "sources_far", "sources_hidden_skipped"].iter().zip(&self.tally)
         {
             report.count(name, sum.load(Ordering::Relaxed) as usize);

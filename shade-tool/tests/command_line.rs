@@ -1,75 +1,12 @@
 //! The program from files to files: exit codes, messages, the same bytes for any number of threads.
 #![allow(clippy::unwrap_used)]
 
-use assert_cmd::Command;
-use interchange::digest::Digest;
-use interchange::ids::{FaceId, GroupId, MaterialId, NodeId, VertexId};
+mod common;
+
+use common::{cube, furnace, run};
 use interchange::materials::{Material, MaterialTable};
-use interchange::mesh::{Cluster, Mesh};
 use interchange::provenance::Provenance;
-use interchange::solution::{Origins, Solution};
 use std::path::Path;
-use std::process::Output;
-
-/// The unit cube with inward fronts, one element to a wall; the ceiling emits.
-fn cube() -> Mesh {
-    let mut mesh = Mesh {
-        vertices: (0..8).map(|k| [k & 1, k >> 1 & 1, k >> 2].map(f64::from)).collect(),
-        groups: vec!["walls".into()],
-        materials: vec!["white".into(), "lamp".into()],
-        clusters: vec![Cluster { start: 0, end: 6, first_child: 0, second_child: 0 }],
-        input_face_count: 6,
-        ..Mesh::default()
-    };
-    let walls = [[0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3], [0, 1, 3, 2], [4, 6, 7, 5]];
-    for (face, wall) in walls.into_iter().enumerate() {
-        let corners = wall.map(VertexId);
-        mesh.elements.push(corners);
-        mesh.element_nodes.push((0..4).map(|k| NodeId::new(4 * face + k)));
-        mesh.node_vertices.extend(corners);
-        mesh.element_faces.push(FaceId::new(face));
-        mesh.element_sides.push(0);
-        mesh.faces.push(corners);
-        mesh.occluders.push(corners);
-        mesh.occluder_faces.push(FaceId::new(face));
-        mesh.face_inputs.push(face as u32);
-        mesh.face_groups.push(GroupId(0));
-        mesh.face_materials.push(MaterialId(u32::from(face == 1)));
-        mesh.face_flags.push(0);
-    }
-    mesh
-}
-
-/// A folder with `s.mesh`, `s.materials` and `s.sol`: radiosity 1, 2, 4 everywhere, in balance with the materials.
-fn furnace() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    let written = |tool: &str| Provenance::new(tool, "test");
-    cube().write(&at("s.mesh"), written("mesh-tool")).unwrap();
-    let white = Material { diffuse: [1.0; 3], ..Material::default() };
-    let radiance = [1.0, 2.0, 4.0].map(|b| b / std::f64::consts::PI);
-    let lamp = Material { radiance, ..Material::default() };
-    let names = vec!["white".into(), "lamp".into()];
-    MaterialTable { names, values: vec![white, lamp] }
-        .write(&at("s.materials"), written("mesh-tool"))
-        .unwrap();
-    let (_, _, mesh) = Mesh::read(&at("s.mesh")).unwrap();
-    let (_, _, materials) = MaterialTable::read(&at("s.materials")).unwrap();
-    let values = vec![[1.0, 2.0, 4.0]; 6];
-    let solution = Solution { radiosity: values.clone(), irradiance: values, ..Solution::default() };
-    let origins = Origins { mesh, matrix: Digest::of(b"matrix"), materials };
-    solution.write(&at("s.sol"), written("solve-tool"), origins).unwrap();
-    folder
-}
-
-fn run(folder: &Path, line: &str) -> Output {
-    Command::cargo_bin("shade-tool")
-        .unwrap()
-        .current_dir(folder)
-        .args(line.split_whitespace())
-        .output()
-        .unwrap()
-}
 
 /// Exit code and the one line on stderr.
 fn failure(folder: &Path, line: &str) -> (Option<i32>, String) {
@@ -264,6 +201,7 @@ fn bad_usage_ends_with_2() {
         "--camera-name front",
         "--focal-length 1",
         "--exposure 1",
+        "--interpolation constant --bounces s.sol",
         "--fov-deg 30 --focal-length 1 --film 1,1",
     ] {
         let (code, stderr) = failure(folder.path(), &format!("{render} {flags}"));
@@ -276,6 +214,9 @@ fn bad_usage_ends_with_2() {
         "probe s.sol --mesh s.mesh -o o.csv",
         "render s.sol --mesh s.mesh -o s.png",
         "probe s.sol --mesh s.mesh --points p.csv -o out.txt",
+        "probe s.sol --mesh s.mesh --points p.csv --spacing 0.1 -o out.csv",
+        "probe s.sol --mesh s.mesh --points p.csv --height 1 -o out.csv",
+        "probe s.sol --mesh s.mesh --points p.csv --grid walls --spacing 1 -o out.csv",
     ] {
         assert_eq!(failure(folder.path(), line).0, Some(2), "{line}");
     }
@@ -367,7 +308,13 @@ fn layers_are_stored_by_name_and_skips_do_not_change_the_answer() {
         told["layers"][0]["channels"][2]["mean"].as_f64().unwrap()
     };
     let want = values("");
-    for flags in ["--no-skip far", "--no-skip hidden", "--no-skip far,hidden", "--interpolation gather"] {
+    for flags in [
+        "--no-skip far",
+        "--no-skip hidden",
+        "--no-skip far,hidden,joined",
+        "--no-skip joined",
+        "--interpolation gather",
+    ] {
         // In a furnace all that is gathered is 1; the lamp's part of the tolerance is a tenth of 0.02.
         assert!((values(flags) / want - 1.0).abs() < 2e-3, "{flags}");
     }
