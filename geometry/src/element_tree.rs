@@ -53,6 +53,8 @@ pub(crate) struct Node {
     pub(crate) radius: f64,
     /// Where all elements lie in one plane and look the same way.
     pub(crate) plane: Option<Plane>,
+    /// Where they also fill a convex polygon: its corners, among the tree's.
+    hull: Range<usize>,
 }
 
 impl ElementTree {
@@ -85,6 +87,11 @@ impl ElementTree {
         &self.corners[first_corner as usize..(first_corner + corner_count) as usize]
     }
 
+    /// The convex polygon that a node's elements fill; no corners where they fill none.
+    pub(crate) fn hull(&self, node: &Node) -> &[DVec3] {
+        &self.corners[node.hull.clone()]
+    }
+
     /// The elements below a node.
     pub(crate) fn members(&self, node: &Node) -> impl Iterator<Item = usize> + '_ {
         self.order[node.range.clone()].iter().map(|&k| k as usize)
@@ -93,15 +100,39 @@ impl ElementTree {
     /// Grows the node over a range of the order, and all below it; returns its index.
     fn grow(&mut self, range: Range<usize>) -> usize {
         let index = self.nodes.len();
-        let node = self.node(range.clone());
+        let mut node = self.node(range.clone());
         let is_flat = node.plane.is_some();
+        if let Some(plane) = node.plane.filter(|_| range.len() > 1) {
+            let area: f64 = self.members(&node).map(|k| self.elements[k].area).sum();
+            let hull = convex_hull(self.members(&node).flat_map(|k| self.corners(k)).copied(), &plane);
+            if (polygon::area(&hull) - area).abs() <= PLANARITY * area {
+                node.hull = self.corners.len()..self.corners.len() + hull.len();
+                self.corners.extend(hull);
+            }
+        }
+        let longest = node.axes.into_iter().fold(DVec3::ZERO, |best, axis| {
+            if axis.length_squared() > best.length_squared() { axis } else { best }
+        });
+        let halves = (node.middle, longest);
         self.nodes.push(node);
         if range.len() > LEAF || (range.len() > 1 && !is_flat) {
-            let middle = self.split(range.clone(), is_flat);
+            let middle = if is_flat { self.halve(range.clone(), halves) } else { None };
+            let middle = middle.unwrap_or_else(|| self.split(range.clone(), is_flat));
             self.grow(range.start..middle);
             self.nodes[index].second_child = self.grow(middle..range.end);
         }
         index
+    }
+
+    /// Orders a range by the side of a box's middle that elements lie on, along an axis: cells that came from halving fill
+    /// convex polygons again. `None` where all lie on one side.
+    fn halve(&mut self, range: Range<usize>, (middle, axis): (DVec3, DVec3)) -> Option<usize> {
+        let elements = &self.elements;
+        let is_behind = |k: &u32| axis.dot(elements[*k as usize].centroid - middle) < 0.0;
+        let members = &mut self.order[range.clone()];
+        members.sort_by_key(|k| !is_behind(k));
+        let count = members.iter().filter(|k| is_behind(k)).count();
+        (count > 0 && count < members.len()).then_some(range.start + count)
     }
 
     /// Orders a range along its longest extent, directions counting like the size of the range, and returns where to part it.
@@ -175,8 +206,36 @@ impl ElementTree {
             boxed([DVec3::X, DVec3::Y, DVec3::Z])
         };
         let radius = axes.iter().map(|axis| axis.length_squared()).sum::<f64>().sqrt();
-        Node { range, second_child: 0, middle, axes, radius, plane: is_flat.then_some(plane) }
+        Node { range, second_child: 0, middle, axes, radius, plane: is_flat.then_some(plane), hull: 0..0 }
     }
+}
+
+/// Convex hull of points of a plane, counter-clockwise seen from its front, without straight corners (Andrew 1979).
+fn convex_hull(points: impl Iterator<Item = DVec3>, plane: &Plane) -> Vec<DVec3> {
+    let (u, v) = plane.axes();
+    let mut points: Vec<(f64, f64, DVec3)> = points.map(|p| (u.dot(p), v.dot(p), p)).collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+    let extent = points.iter().map(|p| p.2.distance(points[0].2)).fold(0.0, f64::max);
+    let mut hull: Vec<(f64, f64, DVec3)> = Vec::new();
+    for pass in 0..2 {
+        let first = hull.len();
+        for k in 0..points.len() {
+            let next = if pass == 0 { points[k] } else { points[points.len() - 1 - k] };
+            while hull.len() >= first + 2 {
+                let (a, b) = (hull[hull.len() - 2], hull[hull.len() - 1]);
+                let turn = (b.0 - a.0) * (next.1 - a.1) - (b.1 - a.1) * (next.0 - a.0);
+                let base = ((next.0 - a.0).powi(2) + (next.1 - a.1).powi(2)).sqrt();
+                // How far the corner stands out of the line past it.
+                if turn > PLANARITY * extent * base {
+                    break;
+                }
+                hull.pop();
+            }
+            hull.push(next);
+        }
+        hull.pop();
+    }
+    hull.into_iter().map(|p| p.2).collect()
 }
 
 #[cfg(test)]
@@ -203,6 +262,8 @@ mod tests {
             assert_eq!(tree.members(leaf).count(), 4);
             assert!((leaf.radius - 2f64.sqrt()).abs() < 1e-12);
             assert!((leaf.middle.element_sum() - 2.0).abs() < 1e-12);
+            let hull = tree.hull(leaf);
+            assert!(hull.len() == 4 && (polygon::area(hull) - 4.0).abs() < 1e-12);
         }
         assert!(tree.nodes[0].plane.is_none() && (tree.nodes[0].radius - 3f64.sqrt()).abs() < 1e-12);
     }

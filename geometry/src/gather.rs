@@ -42,6 +42,12 @@ pub(crate) trait Taker {
     fn takes_element(&mut self, element: usize, to_point: Look) -> bool;
     /// An element, and what is seen of it: convex pieces above the horizon, from the point as origin.
     fn take(&mut self, element: usize, seen: &Polygons, look: Look);
+    /// Whether the convex polygon that a node's elements fill serves instead of them.
+    fn stands_in(&mut self, _node: usize, _look: Look) -> bool {
+        false
+    }
+    /// Such a node, and what is seen of its polygon.
+    fn take_node(&mut self, _node: usize, _seen: &Polygons, _look: Look) {}
     /// A cluster proved to be wholly behind one body.
     fn hidden(&mut self) {}
 }
@@ -145,6 +151,13 @@ impl Gatherer {
         if is_free && taker.takes_node(index, look) {
             return;
         }
+        let hull = self.tree.hull(node);
+        if !hull.is_empty() && taker.stands_in(index, look) {
+            let seen = see(hull, list, look, scratch);
+            taker.take_node(index, seen, look);
+            scratch.candidates.truncate(start);
+            return;
+        }
         if node.second_child == 0 {
             for &k in &self.tree.order[node.range.clone()] {
                 self.visit_element(k as usize, list.clone(), look, scratch, taker);
@@ -177,20 +190,23 @@ impl Gatherer {
         if high <= 0.0 {
             return;
         }
-        let Scratch { shadows, candidates, pieces, corners: seen, cut } = scratch;
-        let is_free = list.is_empty();
-        if is_free && low >= 0.0 && taker.takes_element(k, look) {
+        if list.is_empty() && low >= 0.0 && taker.takes_element(k, look) {
             return;
         }
-        // The element above the horizon, seen from the point as origin.
-        cut.clear();
-        cut.extend(corners.iter().map(|&c| c - look.point));
-        if low < 0.0 {
-            polygon::clip_by(cut, |r| look.normal.dot(r), seen);
-            std::mem::swap(cut, seen);
-        }
-        taker.take(k, pieces.visible(cut, &candidates[list], shadows), look);
+        taker.take(k, see(corners, list, look, scratch), look);
     }
+}
+
+/// What is seen of a polygon: above the horizon, past the candidates of the list, from the point as origin.
+fn see<'s>(corners: &[DVec3], list: Range<usize>, look: Look, scratch: &'s mut Scratch) -> &'s Polygons {
+    let Scratch { shadows, candidates, pieces, corners: above, cut } = scratch;
+    cut.clear();
+    cut.extend(corners.iter().map(|&c| c - look.point));
+    if cut.iter().any(|&r| look.normal.dot(r) < 0.0) {
+        polygon::clip_by(cut, |r| look.normal.dot(r), above);
+        std::mem::swap(cut, above);
+    }
+    pieces.visible(cut, &candidates[list], shadows)
 }
 
 #[cfg(test)]

@@ -20,6 +20,8 @@ const OUTLIER: f64 = 3.0;
 /// Values that few elements take are fitted by any line: they have to lie within so many times the tolerance.
 const FEW: usize = 6;
 const FEW_RANGE: f64 = 10.0;
+/// More cells than so many times the elements are not worth it: the elements themselves serve.
+const MOST_CELLS: usize = 4;
 /// Halvings of a piece in a row.
 const DEEPEST: u32 = 40;
 /// A plane is not fitted to places that lie on a line to this part.
@@ -94,7 +96,7 @@ impl Sources {
             let meshed = area(&mut members.iter().map(|&k| &scene.sources[k]));
             // Elements that were moved off their face by more than rounding are not described by its pieces.
             let same_area = (area(&mut found.polygons.iter()) - meshed).abs() <= 1e-6 * meshed;
-            if same_area && found.polygons.len() < members.len() {
+            if same_area && found.polygons.len() <= MOST_CELLS * members.len() {
                 all.polygons.append(&mut found.polygons);
                 all.strengths.append(&mut found.strengths);
                 all.slopes.append(&mut found.slopes);

@@ -45,15 +45,15 @@ pub fn total(parts: &Parts) -> [f64; 3] {
 
 /// What a source's elements may deviate from it, in units of what its share may be off by: the form factors of all of
 /// them together are 1, and deviations have both signs.
-const JOINED: f64 = 60.0;
+const JOINED: f64 = 25.0;
 
 /// Everything that can light a point.
 #[derive(Debug)]
 pub struct Light {
     tree: SourceTree<6>,
     opening: Opening,
-    /// Elements by exact factors, clusters by moments, clusters hidden, in this order.
-    tally: [AtomicU64; 3],
+    /// Elements by exact factors, clusters by moments, clusters by fitted polygons, clusters hidden, in this order.
+    tally: [AtomicU64; 4],
     /// Elements less sources.
     joined: usize,
 }
@@ -93,7 +93,7 @@ impl Light {
     /// Irradiance by its parts.
     pub fn irradiance(&self, receiver: &Receiver, scratch: &mut Scratch) -> Parts {
         let (parts, counts) = self.tree.gather(receiver.point, receiver.normal, self.opening, scratch);
-        for (sum, count) in self.tally.iter().zip([counts.exact, counts.far, counts.hidden]) {
+        for (sum, count) in self.tally.iter().zip([counts.exact, counts.far, counts.fitted, counts.hidden]) {
             sum.fetch_add(count, Ordering::Relaxed);
         }
         parts
@@ -102,7 +102,9 @@ impl Light {
     /// Tells how sources were counted so far.
     pub fn count(&self, report: &mut Report) {
         report.count("elements_joined_skipped", self.joined);
-        for (name, sum) in ["sources_exact", "sources_far", "sources_hidden_skipped"].iter().zip(&self.tally)
+        for (name, sum) in ["sources_exact", "sources_far", "sources_fitted", "sources_hidden_skipped"]
+            .iter()
+            .zip(&self.tally)
         {
             report.count(name, sum.load(Ordering::Relaxed) as usize);
         }
