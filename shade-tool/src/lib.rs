@@ -4,7 +4,8 @@
 //! facets that are seen ([`facets`], [`nodes`], [`node_places`]), cuts facets where interpolation is not good enough ([`refined`]),
 //! interpolates ([`interpolation`]) and writes radiance and layers ([`layers`]) as OpenEXR ([`exr_file`]) and a tone-mapped
 //! preview ([`preview`]), for one camera or several ([`camera`], [`frames`]). [`probe`] gathers irradiance at the points of a
-//! table or of a grid ([`grid`]). [`info`] tells what a picture holds. [`skips`] names what is left out.
+//! table or of a grid ([`grid`]). [`info`] tells what a picture holds. [`joined`] makes few sources of the
+//! solution's elements, [`bounces`] layers of light by its number of reflections. [`skips`] names what is left out.
 //!
 //! # Limitations
 //! Surfaces are seen as Lambertian: specular and transparent parts of a material do not show.
