@@ -7,7 +7,8 @@
 //! and shows it tone-mapped, in false colours ([`quantity`], [`colour_scale`]), with isolux contours ([`contours`],
 //! [`isolux`]), with the mesh ([`mesh_overlay`]) or the error of its elements ([`element_error`]); [`sheet`] puts pictures side by
 //! side; both draw on a [`canvas`] with letters of [`font`]. [`probe`] gathers irradiance at the points of a
-//! table or of a grid ([`grid`]). [`info`] tells what a picture holds. [`skips`] names what is left out.
+//! table or of a grid ([`grid`]). [`info`] tells what a picture holds. [`joined`] makes few sources of
+//! the solution's elements, [`bounces`] layers of light by its number of reflections. [`skips`] names what is left out.
 //!
 //! Besides the solution there are the models of direct light that came before it ([`shading`], [`local_picture`]): emitters as
 //! exactly visible polygons ([`direct_light`]), highlights of [`phong`] and [`cook_torrance`] with [`fresnel`]'s law,
