@@ -23,7 +23,7 @@ pub struct SourceTree<const N: usize> {
     /// Strength of each of the gatherer's elements, at its centroid.
     strengths: Vec<[f64; N]>,
     /// Slopes of those elements whose strength changes, and the steepest of each.
-    slopes: Vec<Option<(f64, Slope<N>)>>,
+    slopes: Vec<Change<N>>,
     /// Of each of the gatherer's elements.
     element_sources: Vec<Source<N>>,
     /// Of each node of the gatherer's tree.
@@ -32,6 +32,9 @@ pub struct SourceTree<const N: usize> {
 
 /// How strength changes over a source: its gradient in the source's plane, one for each of the N numbers.
 pub type Slope<const N: usize> = [DVec3; N];
+
+/// The slope of a source that is not even, and its steepest of the N.
+type Change<const N: usize> = Option<(f64, Slope<N>)>;
 
 /// Cuts in a row of what is seen of a source that is not even: each halves the doubt about where its mean is.
 const MOST_CUTS: u32 = 24;
@@ -279,7 +282,7 @@ impl<const N: usize> SourceTree<N> {
             (steepest > 0.0).then_some((steepest, slope))
         };
         let slope = |element: &Element| slopes.get(element.index).copied().flatten().and_then(with_steepest);
-        let slopes: Vec<Option<(f64, Slope<N>)>> = tree.elements.iter().map(slope).collect();
+        let slopes: Vec<Change<N>> = tree.elements.iter().map(slope).collect();
         let strength = |element: &Element| strengths.get(element.index).copied().unwrap_or([0.0; N]);
         let strengths: Vec<[f64; N]> = tree.elements.iter().map(strength).collect();
         let element_sources = (0..tree.elements.len()).map(|k| {
@@ -313,12 +316,7 @@ impl<const N: usize> SourceTree<N> {
 }
 
 impl<const N: usize> NodeSource<N> {
-    fn new(
-        tree: &ElementTree,
-        node: &Node,
-        strengths: &[[f64; N]],
-        slopes: &[Option<(f64, Slope<N>)>],
-    ) -> NodeSource<N> {
+    fn new(tree: &ElementTree, node: &Node, strengths: &[[f64; N]], slopes: &[Change<N>]) -> NodeSource<N> {
         let lit = tree.members(node).any(|k| strengths[k].iter().any(|&s| s != 0.0));
         let flat: Option<Source<N>> = node.plane.filter(|_| lit).map(|plane| {
             let area: f64 = tree.members(node).map(|k| tree.elements[k].area).sum();
@@ -350,13 +348,13 @@ impl<const N: usize> StandIn<N> {
         node: &Node,
         plane: &Plane,
         source: &Source<N>,
-        (strengths, slopes): (&[[f64; N]], &[Option<(f64, Slope<N>)>]),
+        (strengths, slopes): (&[[f64; N]], &[Change<N>]),
     ) -> Option<StandIn<N>> {
         let mut even = Moments::<1>::none(plane);
         even.add(tree.hull(node), plane, (&[1.0], source.centre), &None, source.centre);
         let (area, [[uu], [vv], [uv]]) = (even.zeroth[0], even.second);
         let determinant = uu * vv - uv * uv;
-        if !(determinant > 0.0) {
+        if determinant <= 0.0 || determinant.is_nan() {
             return None;
         }
         let Moments { axes: [u, v], zeroth, first, .. } = &source.moments;
@@ -409,7 +407,7 @@ impl<const N: usize> Moments<N> {
         polygon: &[DVec3],
         plane: &Plane,
         (strength, centroid): (&[f64; N], DVec3),
-        slope: &Option<(f64, Slope<N>)>,
+        slope: &Change<N>,
         centre: DVec3,
     ) {
         let (mut area, mut first, mut second) = (0.0, [0.0; 2], [0.0; 3]);

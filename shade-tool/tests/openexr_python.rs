@@ -62,7 +62,7 @@ fn write_bounces(folder: &Path) {
 fn another_reader_finds_every_layer_and_attribute() {
     let folder = furnace();
     write_bounces(folder.path());
-    let line = "render s.sol --mesh s.mesh -o s.exr --eye 0.5,0.5,0.1 --look-at 0.5,0.5,1 --fov-deg 50 --size 8x6 \
+    let line = "render s.sol --mesh s.mesh -o s.exr --eye 0.5,0.5,0.1 --look-at 0.5,0.5,1 --fov-deg 40 --size 8x6 \
                 --layers albedo,normal,depth,element,face,irradiance,direct,indirect,error --bounces b0.sol,b1.sol";
     let output = run(folder.path(), line);
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
