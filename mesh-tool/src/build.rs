@@ -113,6 +113,7 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
     let mut cleaned = clean(scene, &options.no_clean, report)?;
     let mut layers = layers_of(&cleaned, options);
     note(report, "clean", start);
+    let mut overlapped = 0.0;
     let name = |faces: &[Face], face: u32, trouble: Trouble| trouble.at(scene, faces[face as usize].line);
 
     let pieces;
@@ -124,7 +125,8 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
         let solids = if off.leaves(Step::Hidden) { Solids::new(&cleaned) } else { Solids::default() };
         report.count("closed bodies", solids.len());
         if off.leaves(Step::Regions) && off.leaves(Step::Meet) && off.leaves(Step::Overlap) {
-            let (merged, lost) = merged(cleaned, &layers, report);
+            let (merged, lost, area) = merged(cleaned, &layers, report);
+            overlapped = area;
             lost.iter().for_each(|loss| warn_of_lost_emitter(scene, loss, report));
             cleaned = merged;
             layers = layers_of(&cleaned, options);
@@ -223,6 +225,8 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
     report.count("hidden parts", total(|p| p.hidden.len()));
     let hidden: f64 = patches.iter().flat_map(|(_, patch)| &patch.hidden).map(|(_, area)| area).sum();
     report.estimate("hidden area", hidden.abs());
+    overlapped += patches.iter().map(|(_, patch)| patch.overlapped).sum::<f64>();
+    report.estimate("overlapped area", overlapped);
     let (mesh, flat) = assemble(scene, cleaned, &pieces, &patches, options.meshes() && !options.linear);
     report.count("pieces without area left out", flat);
     note(report, "assemble", start);

@@ -120,7 +120,7 @@ pub fn clean(scene: &Scene, off: &Off<Step>, report: &mut Report) -> Result<Clea
         }
     }
     let (mut faces, dropped) =
-        if off.leaves(Step::Duplicates) { without_duplicates(faces, scene, report) } else { (faces, 0) };
+        if off.leaves(Step::Duplicates) { without_duplicates(faces, &places, scene, report) } else { (faces, 0) };
     let oriented = if off.leaves(Step::Orient) { orient(&mut faces, &places) } else { Default::default() };
 
     report.count("dropped zero area", without_area);

@@ -10,7 +10,7 @@ use crate::hidden::{HIDDEN, HiddenParts, draw_contacts};
 use crate::patch::{Patch, PatchElement, PatchLine};
 use crate::planar::{Contact, PlanarGraph, Point};
 use crate::refine::{Refinement, Target};
-use crate::regions::winner;
+use crate::regions::{overlapped_area, winner};
 use crate::seeds::lattice;
 use crate::sheets::Layer;
 use crate::solids::Solids;
@@ -81,6 +81,7 @@ pub struct Drawing {
     hidden: HiddenParts,
     contacts: usize,
     overlapping: usize,
+    overlapped: f64,
     crossing: usize,
     lost_emitters: Vec<(u32, u32)>,
     /// Area that the elements will cover, in square units of length.
@@ -168,12 +169,14 @@ impl Drawing {
         crossed.sort_unstable();
         crossed.dedup();
         let emits = |sheet: &u32| scene.faces[layer.sheets[*sheet as usize].face as usize].emits;
+        let overlapped = overlapped_area(&layer, &graph, &triangulation, |_| true);
         Ok(Drawing {
             graph,
             rings,
             hidden,
             contacts: within.len(),
             overlapping: losers.len(),
+            overlapped,
             crossing: crossed.len(),
             lost_emitters: losers.into_iter().filter(|(sheet, _)| emits(sheet)).collect(),
             area,
@@ -270,6 +273,7 @@ impl Drawing {
             points: graph.points.clone(),
             contacts: self.contacts,
             overlapping: self.overlapping,
+            overlapped: self.overlapped,
             crossing: self.crossing,
             lost_emitters: self.lost_emitters.clone(),
             ..Patch::default()

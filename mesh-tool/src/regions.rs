@@ -27,9 +27,9 @@ pub struct LostEmitter {
 }
 
 /// Merges the faces of a scene; one-sided ones only, for both sides of a two-sided face must stay one face. Also
-/// returns the emitters that lost their place to another.
-pub fn merged(scene: Cleaned, layers: &[Layer], report: &mut Report) -> (Cleaned, Vec<LostEmitter>) {
-    let mut lost = Vec::new();
+/// returns the emitters that lost their place to another, and the area that any faces lost so.
+pub fn merged(scene: Cleaned, layers: &[Layer], report: &mut Report) -> (Cleaned, Vec<LostEmitter>, f64) {
+    let (mut lost, mut overlapped) = (Vec::new(), 0.0);
     let mut overlapping = 0;
     let before = scene.faces.len();
     let mut replaced = vec![false; before];
@@ -37,10 +37,11 @@ pub fn merged(scene: Cleaned, layers: &[Layer], report: &mut Report) -> (Cleaned
     let mut scene = scene;
     for layer in layers.iter().filter(|layer| layer.sheets.len() > 1) {
         // Faces too close to be told apart stay faces.
-        let Ok((found, losers)) = regions_of(layer, &mut scene) else {
+        let Ok((found, losers, area)) = regions_of(layer, &mut scene) else {
             report.count("planes not merged", 1);
             continue;
         };
+        overlapped += area;
         let face_of = |sheet: u32| &scene.faces[layer.sheets[sheet as usize].face as usize];
         for (&loser, &winner) in &losers {
             let (face, holder) = (face_of(loser), face_of(winner));
@@ -83,7 +84,7 @@ pub fn merged(scene: Cleaned, layers: &[Layer], report: &mut Report) -> (Cleaned
     faces.sort_by_key(|face| (face.input, face.line, face.corners.first().copied()));
     report.count("faces merged into regions", before.saturating_sub(faces.len()));
     report.count("overlapping faces cut", overlapping);
-    (Cleaned { faces, ..scene }, lost)
+    (Cleaned { faces, ..scene }, lost, overlapped)
 }
 
 /// A region before it is a face.
@@ -123,8 +124,8 @@ impl Region {
 /// Sheets that lost part of their place, and one that holds it.
 type Losers = BTreeMap<u32, u32>;
 
-/// The regions of one layer that one-sided faces hold.
-fn regions_of(layer: &Layer, scene: &mut Cleaned) -> Result<(Vec<Region>, Losers), Trouble> {
+/// The regions of one layer that one-sided faces hold, and the area that one-sided faces lose to others.
+fn regions_of(layer: &Layer, scene: &mut Cleaned) -> Result<(Vec<Region>, Losers, f64), Trouble> {
     let graph = drawn(layer, 0..layer.sheets.len() as u32, scene, |_| {});
     let (graph, triangulation) = graph.arrange(scene.places.tolerance() / layer.frame.size)?;
     let winner = |t: usize| winner(layer, &triangulation, t);
@@ -152,13 +153,35 @@ fn regions_of(layer: &Layer, scene: &mut Cleaned) -> Result<(Vec<Region>, Losers
             losers.entry(sheet).or_insert(winner);
         }
     }
-    Ok((regions, losers))
+    let two_sided = |sheet: u32| scene.faces[layer.sheets[sheet as usize].face as usize].two_sided;
+    let overlapped = overlapped_area(layer, &graph, &triangulation, |sheet| !two_sided(sheet));
+    Ok((regions, losers, overlapped))
 }
 
 /// The sheet that holds a triangle.
 pub fn winner(layer: &Layer, triangulation: &Triangulation, triangle: usize) -> Option<u32> {
     let own = |&(sheet, winding): &(u32, i32)| winding > 0 && (sheet as usize) < layer.sheets.len();
     layer.winner(triangulation.sheets(triangle).filter(own).map(|(sheet, _)| sheet))
+}
+
+/// Area that the sheets for which `counts` holds would have where another holds the place.
+pub fn overlapped_area(
+    layer: &Layer,
+    graph: &PlanarGraph,
+    triangulation: &Triangulation,
+    counts: impl Fn(u32) -> bool,
+) -> f64 {
+    let lost = |t: usize| {
+        let holder = winner(layer, triangulation, t)?;
+        let own = triangulation.sheets(t).filter(|&(sheet, _)| (sheet as usize) < layer.sheets.len());
+        let times: i32 = own
+            .filter(|&(sheet, winding)| winding > 0 && counts(sheet))
+            .map(|(sheet, winding)| winding - i32::from(sheet == holder))
+            .sum();
+        let corners = triangulation.triangles[t].corners.map(|p| graph.points[p as usize].position);
+        (times > 0).then(|| f64::from(times) * polygon::area(&corners))
+    };
+    (0..triangulation.triangles.len()).filter_map(lost).sum::<f64>().abs()
 }
 
 /// Places of points; where borders cross each other, new ones.

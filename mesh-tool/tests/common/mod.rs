@@ -12,6 +12,8 @@ use mesh_tool::{Options, build};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+pub mod soup;
+
 pub fn scene_path(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/scenes").join(name)
 }
@@ -192,6 +194,32 @@ pub fn assert_conforming(mesh: &Mesh) -> usize {
         }
     }
     interior
+}
+
+/// Asserts that no vertex of any element lies inside an edge of another, of whatever plane, further from its ends than
+/// places that are one.
+pub fn assert_no_t_vertices(mesh: &Mesh) {
+    let mut used: Vec<VertexId> =
+        mesh.element_ids().flat_map(|e| mesh.elements.row(e.index()).iter().copied()).collect();
+    used.sort_unstable();
+    used.dedup();
+    let all: Vec<DVec3> = used.iter().map(|&v| mesh.position(v)).collect();
+    let weld = 1e-9 * polygon::diameter(&all);
+    for element in mesh.element_ids() {
+        for (p, q) in polygon::edges(&mesh.element_corners(element)) {
+            let (low, high) = (p.min(q) - weld, p.max(q) + weld);
+            for (&vertex, &x) in used.iter().zip(&all) {
+                if !(x.cmpge(low).all() && x.cmple(high).all()) {
+                    continue;
+                }
+                let along = (x - p).dot(q - p) / (q - p).length_squared();
+                let near = x.distance(p.lerp(q, along)) <= 0.5 * weld;
+                let apart = x.distance(p) > 2.0 * weld && x.distance(q) > 2.0 * weld;
+                let inside = along > 0.0 && along < 1.0;
+                assert!(!(near && apart && inside), "{vertex:?} lies inside an edge of {element:?}");
+            }
+        }
+    }
 }
 
 /// OBJ text of an axis-aligned box with outward faces and a bottom only where asked; `first` is the number of its
