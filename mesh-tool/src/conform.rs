@@ -20,7 +20,7 @@ pub fn meet(drawings: &[Drawing], meshes: &mut [Triangles], tolerance: f64) -> u
         let layers = meshes.par_iter_mut().zip(drawings).zip(&found).zip(&mut tangled);
         layers.for_each(|(((mesh, drawing), found), tangled)| {
             if !found.is_empty() && !*tangled {
-                *tangled = drawing.split_edges(mesh, found, round < ROUNDS).is_err();
+                *tangled = drawing.split_edges(mesh, found, round < ROUNDS, tolerance).is_err();
             }
         });
     }

@@ -4,7 +4,7 @@
 use crate::frame::turn;
 use crate::places::Places;
 use crate::planar::{Border, PlanarGraph};
-use crate::triangulation::{Triangulation, Trouble};
+use crate::triangulation::{RESOLUTION, Triangulation, Trouble};
 use glam::DVec2;
 use std::collections::HashMap;
 
@@ -85,7 +85,9 @@ pub fn pieces_of_polygon(
     let ring: Vec<u32> =
         corners.iter().map(|&place| graph.corner(frame, place, places.position(place))).collect();
     graph.ring(&ring, Border { sheet: 0, forward: true });
-    let (graph, triangulation) = graph.arrange(places.tolerance() / frame.size)?;
+    // As fine as can be: a border that is bent where it passes a corner closely would not keep its area.
+    let fine = graph.clone().arrange(RESOLUTION);
+    let (graph, triangulation) = fine.or_else(|_| graph.arrange(places.tolerance() / frame.size))?;
     let rings =
         convex_pieces(&graph, &triangulation, |t| triangulation.winding(t, 0) > 0, |_| false, |_| true);
     let places_of = |ring: Vec<u32>| -> Option<Vec<u32>> {

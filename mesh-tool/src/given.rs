@@ -100,7 +100,8 @@ fn cut(
     let own: Vec<u32> = layer.sheets[index as usize].ring.clone();
     let keep = |point: u32| graph.points[point as usize].place.is_some_and(|place| own.contains(&place));
     let rings = convex_pieces(&graph, &triangulation, held, seam, keep);
-    let lost = (0..triangulation.triangles.len()).filter(|&t| triangulation.winding(t, index) > 0 && !held(t));
+    let lost =
+        (0..triangulation.triangles.len()).filter(|&t| triangulation.winding(t, index) > 0 && !held(t));
     let area = |t: usize| {
         polygon::area(&triangulation.triangles[t].corners.map(|p| graph.points[p as usize].position))
     };

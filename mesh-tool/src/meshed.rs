@@ -241,15 +241,18 @@ impl Drawing {
         Ok(())
     }
 
-    /// Splits edges of the graph at given points; with `widen`, widens the small angles that this makes.
+    /// Splits edges of the graph at given points; with `widen`, widens the small angles that this makes. What tangles is
+    /// joined within `tolerance`, in units of length.
     pub fn split_edges(
         &self,
         triangles: &mut Triangles,
         splits: &[EdgeSplit],
         widen: bool,
+        tolerance: f64,
     ) -> Result<(), Trouble> {
         let mut refinement = triangles.refinement.clone();
-        let triangulation = refinement.split_edges(splits, &self.layer.frame, widen)?;
+        let tolerance = tolerance / self.layer.frame.size;
+        let triangulation = refinement.split_edges(splits, &self.layer.frame, widen, tolerance)?;
         *triangles = self.owned(refinement, triangulation);
         Ok(())
     }

@@ -11,7 +11,7 @@ use crate::frame::{Frame, turn};
 use crate::planar::{Contact, PlanarGraph, Point};
 use crate::triangulation::{Triangle, Triangulation, Trouble, grid_place};
 use glam::{DVec2, DVec3};
-use std::collections::{BTreeSet, HashSet};
+use std::collections::{BTreeSet, HashMap};
 
 /// Triangles with a smaller angle are refined, in degrees. Ruppert's bound for termination is 20.7; the floor on the
 /// edge length ends the rest.
@@ -118,30 +118,45 @@ impl Refinement {
         self.widen(first_new).map(Some)
     }
 
-    /// Splits edges at points, which stand in order along them; with `widen`, widens the small angles this makes.
+    /// Splits edges at points, which stand in order along them; with `widen`, widens the small angles this makes. Where
+    /// edges then tangle, they are joined within `tolerance`, in units of the frame.
     pub fn split_edges(
         &mut self,
         splits: &[EdgeSplit],
         frame: &Frame,
         widen: bool,
+        tolerance: f64,
     ) -> Result<Triangulation, Trouble> {
         let first_new = self.graph.points.len();
-        // Two edges closer together than the triangulation can tell must not get a point at the same place.
-        let mut taken: HashSet<[u64; 2]> =
-            self.graph.points.iter().map(|point| grid_place(point.uv)).collect();
+        // Edges that pass one place closely are all led through the one point there, and so join up to where they part.
+        let mut known: HashMap<[u64; 2], u32> = HashMap::new();
+        for (k, point) in self.graph.points.iter().enumerate() {
+            known.insert(grid_place(point.uv), k as u32);
+        }
         for (edge, points) in splits {
             let ends = [self.graph.edges[*edge].from, self.graph.edges[*edge].to];
             let size = ends.iter().map(|&p| self.sizes[p as usize]).fold(0.0, f64::max);
-            let points: Vec<Point> = points
-                .iter()
-                .map(|&(_, position)| Point { uv: frame.flatten(position), position, place: None })
-                .filter(|point| taken.insert(grid_place(point.uv)))
-                .collect();
-            self.free.extend(points.iter().map(|_| false));
-            self.sizes.extend(points.iter().map(|_| size));
-            self.graph.split_at(*edge, &points);
+            let mut stops = Vec::new();
+            for &(_, position) in points {
+                let point = Point { uv: frame.flatten(position), position, place: None };
+                let stop = *known.entry(grid_place(point.uv)).or_insert_with(|| {
+                    self.free.push(false);
+                    self.sizes.push(size);
+                    self.graph.point(point)
+                });
+                if std::mem::replace(&mut self.free[stop as usize], false) {
+                    self.graph.points[stop as usize].position = position;
+                }
+                stops.push(stop);
+            }
+            self.graph.lead_through(*edge, &stops);
         }
-        if widen { self.widen(first_new) } else { self.graph.triangulate() }
+        self.graph.join_edges();
+        let split = if widen { self.clone().widened(first_new) } else { self.clone().triangulated() };
+        let (refinement, triangulation) = split
+            .or_else(|_| self.arrange(tolerance).map(|(_, triangulation)| (self.clone(), triangulation)))?;
+        *self = refinement;
+        Ok(triangulation)
     }
 
     /// Adds a line that may cross others; to be followed by [`Refinement::rearrange`].
@@ -151,19 +166,38 @@ impl Refinement {
         self.graph.contact(from, to, contact);
     }
 
-    /// Splits edges where they cross after lines were added; points keep their numbers.
+    /// Splits edges where they cross after lines were added.
     pub fn rearrange(&mut self, tolerance: f64) -> Result<Triangulation, Trouble> {
-        let before = self.free.len();
-        self.graph = self.graph.clone().arrange(tolerance)?.0;
-        self.free.resize(self.graph.points.len(), false);
-        let spacing = self.target.spacing;
-        self.sizes.resize(self.graph.points.len(), spacing);
-        for edge in &self.graph.edges {
+        let first_new = self.arrange(tolerance)?.0;
+        self.widen(first_new)
+    }
+
+    /// Splits and joins edges where they meet within the tolerance; also returns the number of the first new point.
+    fn arrange(&mut self, tolerance: f64) -> Result<(usize, Triangulation), Trouble> {
+        let (graph, triangulation, renamed) = self.graph.clone().arrange_renaming(tolerance)?;
+        let count = graph.points.len();
+        let (mut free, mut sizes) = (vec![true; count], vec![self.target.spacing; count]);
+        for (old, &new) in renamed.iter().enumerate() {
+            // Points that were added have no size of their own yet.
+            sizes[new as usize] = self.sizes.get(old).copied().unwrap_or(self.target.spacing);
+        }
+        for edge in &graph.edges {
             for point in [edge.from, edge.to] {
-                self.free[point as usize] = false;
+                free[point as usize] = false;
             }
         }
-        self.widen(before)
+        (self.graph, self.free, self.sizes) = (graph, free, sizes);
+        Ok((renamed.iter().max().map_or(0, |&last| last as usize + 1), triangulation))
+    }
+
+    fn widened(mut self, first_new: usize) -> Result<(Self, Triangulation), Trouble> {
+        let triangulation = self.widen(first_new)?;
+        Ok((self, triangulation))
+    }
+
+    fn triangulated(self) -> Result<(Self, Triangulation), Trouble> {
+        let triangulation = self.graph.triangulate()?;
+        Ok((self, triangulation))
     }
 
     /// Widens small angles, moving only points from number `first_new` on.

@@ -1,12 +1,12 @@
 //! Planar regions: coplanar neighbours of one material and group become one face, with holes where others hold the
 //! place. What is meshed, casts shadows and receives lines then no longer depends on how a wall was cut into faces.
 
-use crate::clean::{Cleaned, Face, Member};
+use crate::clean::{Cleaned, Face, Member, without_repeats};
 use crate::given::drawn;
 use crate::outline::{regions, ring};
 use crate::planar::PlanarGraph;
 use crate::sheets::Layer;
-use crate::triangulation::{Triangulation, Trouble};
+use crate::triangulation::{RESOLUTION, Triangulation, Trouble};
 use geometry::polygon;
 use interchange::ids::GroupId;
 use interchange::report::Report;
@@ -14,6 +14,9 @@ use std::collections::BTreeMap;
 
 /// A ring turns by less than this at corners that are left out, in radians; far below what a shadow can tell.
 const STRAIGHT: f64 = 1e-10;
+/// So are corners closer than this, in units of the frame, to the line between those beside them: no triangle between
+/// the three could be told from one that is turned over.
+const FLAT: f64 = RESOLUTION;
 
 /// An emitter that lost part of its place to another face.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -186,12 +189,11 @@ pub fn overlapped_area(
 
 /// Places of points; where borders cross each other, new ones.
 fn placed(graph: &PlanarGraph, ring: &[u32], scene: &mut Cleaned) -> Vec<u32> {
-    ring.iter()
-        .map(|&p| {
-            let point = &graph.points[p as usize];
-            point.place.unwrap_or_else(|| scene.places.insert(point.position))
-        })
-        .collect()
+    let place = |&p: &u32| {
+        let point = &graph.points[p as usize];
+        point.place.unwrap_or_else(|| scene.places.insert(point.position))
+    };
+    without_repeats(ring.iter().map(place).collect())
 }
 
 fn without_straight(graph: &PlanarGraph, mut ring: Vec<u32>) -> Vec<u32> {
@@ -201,7 +203,8 @@ fn without_straight(graph: &PlanarGraph, mut ring: Vec<u32>) -> Vec<u32> {
         let [a, b, c] =
             [ring[(k + n - 1) % n], ring[k], ring[(k + 1) % n]].map(|p| graph.points[p as usize].uv);
         let (before, after) = (b - a, c - b);
-        let straight = before.perp_dot(after).abs() <= STRAIGHT * before.length() * after.length();
+        let limit = (STRAIGHT * before.length() * after.length()).max(FLAT * a.distance(c));
+        let straight = before.perp_dot(after).abs() <= limit;
         if straight && before.dot(after) > 0.0 {
             ring.remove(k);
         } else {

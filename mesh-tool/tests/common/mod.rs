@@ -100,7 +100,8 @@ pub fn check(mesh: &Mesh) {
         let normal = polygon::vector_area(&mesh.face_corners(FaceId::new(face)));
         assert!(polygon::is_convex(&corners, normal.normalize(), 1e-8), "piece {piece} is not convex");
         assert!(polygon::vector_area(&corners).dot(normal) > 0.0);
-        piece_area[face] += polygon::area(&corners);
+        // Seen along the normal: a strip of a face that is planar to its tolerance may lie at an angle.
+        piece_area[face] += polygon::vector_area(&corners).dot(normal.normalize());
         pieces_of[face].push(corners);
     }
     for face in (0..mesh.face_count()).map(FaceId::new) {
@@ -161,8 +162,22 @@ pub fn planes(mesh: &Mesh) -> Vec<Vec<ElementId>> {
 /// Asserts that within each plane every edge is used once in each direction or lies on the rim, and that no vertex
 /// lies inside an edge of the rim. Returns the number of edges used twice.
 pub fn assert_conforming(mesh: &Mesh) -> usize {
+    assert_conforming_among(mesh, planes(mesh))
+}
+
+/// The same within each side of each face.
+pub fn assert_faces_conforming(mesh: &Mesh) -> usize {
+    let mut faces: HashMap<(FaceId, u32), Vec<ElementId>> = HashMap::new();
+    for element in mesh.element_ids() {
+        let side = mesh.element_sides[element.index()];
+        faces.entry((mesh.element_face(element), side)).or_default().push(element);
+    }
+    assert_conforming_among(mesh, faces.into_values().collect())
+}
+
+fn assert_conforming_among(mesh: &Mesh, sets: Vec<Vec<ElementId>>) -> usize {
     let mut interior = 0;
-    for plane in planes(mesh) {
+    for plane in sets {
         let mut uses: HashMap<(VertexId, VertexId), usize> = HashMap::new();
         let mut vertices: Vec<VertexId> = Vec::new();
         for &element in &plane {
@@ -196,28 +211,41 @@ pub fn assert_conforming(mesh: &Mesh) -> usize {
     interior
 }
 
-/// Asserts that no vertex of any element lies inside an edge of another, of whatever plane, further from its ends than
-/// places that are one.
-pub fn assert_no_t_vertices(mesh: &Mesh) {
-    let mut used: Vec<VertexId> =
-        mesh.element_ids().flat_map(|e| mesh.elements.row(e.index()).iter().copied()).collect();
+/// Asserts that where faces meet no vertex lies inside an edge: neither within the rims of the faces nor along lines on
+/// them, whatever face the vertex is of. What is inside a face cannot meet another, [`assert_conforming`] looks there.
+pub fn assert_faces_meet(mesh: &Mesh) {
+    let sorted = |a: VertexId, b: VertexId| (a.min(b), a.max(b));
+    let lines: std::collections::HashSet<_> = mesh.lines.iter().map(|l| sorted(l.from, l.to)).collect();
+    let mut uses: HashMap<(FaceId, u32, (VertexId, VertexId)), usize> = HashMap::new();
+    for element in mesh.element_ids() {
+        let (face, side) = (mesh.element_face(element), mesh.element_sides[element.index()]);
+        let ring = mesh.elements.row(element.index());
+        for k in 0..ring.len() {
+            *uses.entry((face, side, sorted(ring[k], ring[(k + 1) % ring.len()]))).or_default() += 1;
+        }
+    }
+    uses.retain(|(_, _, edge), &mut count| count == 1 || lines.contains(edge));
+    let mut used: Vec<VertexId> = uses.keys().flat_map(|&(_, _, (a, b))| [a, b]).collect();
     used.sort_unstable();
     used.dedup();
     let all: Vec<DVec3> = used.iter().map(|&v| mesh.position(v)).collect();
     let weld = 1e-9 * polygon::diameter(&all);
-    for element in mesh.element_ids() {
-        for (p, q) in polygon::edges(&mesh.element_corners(element)) {
-            let (low, high) = (p.min(q) - weld, p.max(q) + weld);
-            for (&vertex, &x) in used.iter().zip(&all) {
-                if !(x.cmpge(low).all() && x.cmple(high).all()) {
-                    continue;
-                }
-                let along = (x - p).dot(q - p) / (q - p).length_squared();
-                let near = x.distance(p.lerp(q, along)) <= 0.5 * weld;
-                let apart = x.distance(p) > 2.0 * weld && x.distance(q) > 2.0 * weld;
-                let inside = along > 0.0 && along < 1.0;
-                assert!(!(near && apart && inside), "{vertex:?} lies inside an edge of {element:?}");
+    for &(face, _, (a, b)) in uses.keys() {
+        let (p, q) = (mesh.position(a), mesh.position(b));
+        let (low, high) = (p.min(q) - weld, p.max(q) + weld);
+        for (&vertex, &x) in used.iter().zip(&all) {
+            if !(x.cmpge(low).all() && x.cmple(high).all()) {
+                continue;
             }
+            let along = (x - p).dot(q - p) / (q - p).length_squared();
+            let near = x.distance(p.lerp(q, along)) <= 0.5 * weld;
+            let apart = x.distance(p) > 2.0 * weld && x.distance(q) > 2.0 * weld;
+            assert!(
+                !(near && apart && along > 0.0 && along < 1.0),
+                "{vertex:?} at {x} lies inside an edge of {face:?} from {a:?} at {p} to {b:?} at {q}, {:.2e} of the \
+                 tolerance beside it",
+                x.distance(p.lerp(q, along)) / weld
+            );
         }
     }
 }

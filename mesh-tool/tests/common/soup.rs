@@ -1,7 +1,9 @@
 //! Soups: scenes of boxes and slivers that cross, stand on, contain, touch and nearly coincide with each other, from a
 //! few numbers that shrink well or from any bytes; and what a mesh of such a scene must satisfy.
 
-use super::{assert_conforming, assert_no_t_vertices, box_text, check, elements, floor_text, given, scene_of};
+use super::{
+    assert_faces_conforming, assert_faces_meet, box_text, check, elements, floor_text, given, scene_of,
+};
 use geometry::polygon;
 use glam::{DQuat, DVec3};
 use interchange::mesh::Mesh;
@@ -173,9 +175,9 @@ impl Soup {
             test("area", &|| assert_area_conserved(&scene, &mesh, &report));
             if meshed {
                 test("conforming", &|| {
-                    assert_conforming(&mesh);
+                    assert_faces_conforming(&mesh);
                 });
-                test("T-vertices", &|| assert_no_t_vertices(&mesh));
+                test("T-vertices", &|| assert_faces_meet(&mesh));
             }
         }
         faults
