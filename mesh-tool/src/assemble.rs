@@ -7,6 +7,7 @@ use crate::flat::without_flat;
 use crate::frame::contains;
 use crate::nodes::{self, Element};
 use crate::patch::Patch;
+use crate::places::Places;
 use crate::sheets::Layer;
 use geometry::polygon;
 use glam::DVec3;
@@ -48,7 +49,8 @@ pub fn assemble(
                 }
             }
             let surface = (number as u32, sheet.material);
-            own.push(Element { corners, seams, face: sheet.face, side: sheet.side, surface });
+            let element = Element { corners, seams, face: sheet.face, side: sheet.side, surface };
+            own.extend(convex_parts(element, &places, layer.frame.plane.normal));
         }
         let area = |ring: &[u32]| polygon::vector_area(&places.corners(ring)).dot(layer.frame.plane.normal);
         let mut with_area = without_flat(own, area, |place| places.position(place));
@@ -144,6 +146,28 @@ pub fn assemble(
         input_face_count: scene.faces.len() as u32,
     };
     (mesh, flat)
+}
+
+/// A corner may turn this far the wrong way, as a sine: ten times what rounding of the corners (1e-16 of the scene) can do
+/// between edges as short as the weld tolerance.
+const STRAIGHT: f64 = 1e-6;
+
+/// The element, or, where joining places that are one bent it inwards at a corner, triangles around that corner.
+fn convex_parts(element: Element, places: &Places, normal: DVec3) -> Vec<Element> {
+    let n = element.corners.len();
+    let inward = |&k: &usize| {
+        let [a, b, c] = [n - 1, 0, 1].map(|step| places.position(element.corners[(k + step) % n]));
+        (b - a).cross(c - b).dot(normal) < -STRAIGHT * a.distance(b) * b.distance(c)
+    };
+    let Some(k) = (0..n).find(inward).filter(|_| n > 3) else { return vec![element] };
+    let part = |j: usize| {
+        let ring = [k, (k + j) % n, (k + j + 1) % n];
+        let seams =
+            [j == 1 && element.seams[k], element.seams[ring[1]], j == n - 2 && element.seams[ring[2]]];
+        let corners = ring.map(|corner| element.corners[corner]);
+        Element { corners: corners.to_vec(), seams: seams.to_vec(), ..element.clone() }
+    };
+    (1..n - 1).map(part).collect()
 }
 
 /// The scene's face that an element belongs to: of a region the first face that holds its middle.

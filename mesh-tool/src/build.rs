@@ -165,7 +165,7 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
         let light = lit.then(|| Light::new(&cleaned, &pieces)).flatten();
         let name = |face: u32, trouble: Trouble| name(&cleaned.faces, face, trouble);
         let tolerance = cleaned.places.tolerance();
-        let mut meshes = sized(scene, &drawings, light.as_ref(), options, tolerance, report, &name)?;
+        let mut meshes = sized(scene, &drawings, light.as_ref(), options, &cleaned.places, report, &name)?;
         let made = |meshes: &[Triangles]| -> Vec<(&Layer, Patch)> {
             let patches = drawings.par_iter().zip(meshes).map(|(drawing, mesh)| drawing.patch(mesh));
             drawings.iter().map(Drawing::layer).zip(patches.collect::<Vec<_>>()).collect()
@@ -189,7 +189,7 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
                 }
             }
             if off.leaves(Step::Meet) {
-                conform::meet(&drawings, &mut meshes, tolerance);
+                conform::meet(&drawings, &mut meshes, &cleaned.places);
             }
             report.count("elements kept", kept(&base, &meshes));
         }

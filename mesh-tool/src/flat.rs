@@ -57,30 +57,23 @@ pub fn without_flat(
         let length = |j: usize| position(flat.corners[j]).distance(position(flat.corners[(j + 1) % 3]));
         let long = (0..3).fold(0, |best, j| if length(j) > length(best) { j } else { best });
         let [a, b, c] = [0, 1, 2].map(|j| flat.corners[(long + j) % 3]);
-        let Some(&beyond) = owner.get(&(b, a)) else { continue };
-        let Some(other) = slots[beyond].take() else { continue };
-        let Some(at) = (0..other.corners.len()).find(|&j| other.corners[j] == b) else { continue };
-        found.middles.insert((a.min(b), a.max(b)), c);
-        let n = other.corners.len();
+        // Polygons of more corners are faces as given, which need not meet; to bend them would spoil them.
         let seam_of = |j: usize| flat.seams[(long + j) % 3];
-        // Around from b through c to a, and on; a polygon of more corners keeps the new one.
-        let mut corners = vec![b, c];
-        let mut seams = vec![other.seams[at] || seam_of(1), other.seams[at] || seam_of(2)];
-        for step in 1..n {
-            corners.push(other.corners[(at + step) % n]);
-            seams.push(other.seams[(at + step) % n]);
-        }
-        let halves = if n == 3 {
-            let d = corners[3];
-            let inner = |corners: [u32; 3], seams: [bool; 3]| Element {
-                corners: corners.to_vec(),
-                seams: seams.to_vec(),
-                ..other.clone()
-            };
-            vec![inner([b, c, d], [seams[0], false, seams[3]]), inner([c, a, d], [seams[1], seams[2], false])]
-        } else {
-            vec![Element { corners, seams, ..other.clone() }]
+        let Some(&beyond) = owner.get(&(b, a)) else { continue };
+        let Some(other) = slots[beyond].take_if(|other| other.corners.len() == 3) else { continue };
+        let Some(at) = (0..3).find(|&j| other.corners[j] == b) else { continue };
+        found.middles.insert((a.min(b), a.max(b)), c);
+        let d = other.corners[(at + 2) % 3];
+        let half = |corners: [u32; 3], seams: [bool; 3]| Element {
+            corners: corners.to_vec(),
+            seams: seams.to_vec(),
+            ..other.clone()
         };
+        let [long_seam, to_d, from_d] = [0, 1, 2].map(|j| other.seams[(at + j) % 3]);
+        let halves = [
+            half([b, c, d], [long_seam || seam_of(1), false, from_d]),
+            half([c, a, d], [long_seam || seam_of(2), to_d, false]),
+        ];
         for half in halves {
             let slot = slots.len();
             edges(&half).for_each(|edge| {

@@ -42,6 +42,12 @@ impl Triangles {
         self.winners[triangle]
     }
 
+    /// Points on edges of the graph, which no smoothing moves: number and position.
+    pub fn fixed_points(&self) -> impl Iterator<Item = (usize, DVec3)> + '_ {
+        let Refinement { graph, free, .. } = &self.refinement;
+        graph.points.iter().enumerate().filter(|(k, _)| !free[*k]).map(|(k, point)| (k, point.position))
+    }
+
     /// Points on the edges of the graph that elements have.
     pub fn edge_points(&self) -> impl Iterator<Item = DVec3> + '_ {
         self.edges().flat_map(|(_, ends)| ends)
@@ -237,6 +243,22 @@ impl Drawing {
         if any {
             let triangulation = refinement.rearrange(tolerance / self.layer.frame.size)?;
             *triangles = self.owned(refinement, triangulation);
+        }
+        Ok(())
+    }
+
+    /// Moves points by no more than `tolerance`, in units of length, and joins those that get to one place.
+    pub fn move_points(
+        &self,
+        triangles: &mut Triangles,
+        moves: impl Iterator<Item = (usize, DVec3)>,
+        tolerance: f64,
+    ) -> Result<(), Trouble> {
+        let tolerance = tolerance / self.layer.frame.size;
+        let mut refinement = triangles.refinement.clone();
+        match refinement.move_points(moves, &self.layer.frame, tolerance)? {
+            Some(triangulation) => *triangles = self.owned(refinement, triangulation),
+            None => triangles.refinement = refinement,
         }
         Ok(())
     }

@@ -153,10 +153,36 @@ impl Refinement {
         }
         self.graph.join_edges();
         let split = if widen { self.clone().widened(first_new) } else { self.clone().triangulated() };
-        let (refinement, triangulation) = split
-            .or_else(|_| self.arrange(tolerance).map(|(_, triangulation)| (self.clone(), triangulation)))?;
+        let (refinement, triangulation) = split.or_else(|_| {
+            self.arrange(0.5 * tolerance).map(|(_, triangulation)| (self.clone(), triangulation))
+        })?;
         *self = refinement;
         Ok(triangulation)
+    }
+
+    /// Moves points; those that get to one place are joined, and edges that then pass another point closely are led
+    /// through it. `None` where the triangulation stays as it is: all moved less than it can tell.
+    pub fn move_points(
+        &mut self,
+        moves: impl Iterator<Item = (usize, DVec3)>,
+        frame: &Frame,
+        tolerance: f64,
+    ) -> Result<Option<Triangulation>, Trouble> {
+        let mut far = false;
+        for (point, position) in moves {
+            let point = &mut self.graph.points[point];
+            if point.position != position {
+                let uv = frame.flatten(position);
+                far |= grid_place(uv) != grid_place(point.uv);
+                (point.uv, point.position) = (uv, position);
+            }
+        }
+        // Half the tolerance: places are further apart than that, so that only equal ones are joined.
+        if far {
+            self.arrange(0.5 * tolerance).map(|(_, triangulation)| Some(triangulation))
+        } else {
+            Ok(None)
+        }
     }
 
     /// Adds a line that may cross others; to be followed by [`Refinement::rearrange`].
