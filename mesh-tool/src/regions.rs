@@ -7,6 +7,7 @@ use crate::outline::{regions, ring};
 use crate::planar::PlanarGraph;
 use crate::sheets::Layer;
 use crate::triangulation::{RESOLUTION, Triangulation, Trouble};
+use geometry::plane::Plane;
 use geometry::polygon;
 use interchange::ids::GroupId;
 use interchange::report::Report;
@@ -17,6 +18,9 @@ const STRAIGHT: f64 = 1e-10;
 /// So are corners closer than this, in units of the frame, to the line between those beside them: no triangle between
 /// the three could be told from one that is turned over.
 const FLAT: f64 = RESOLUTION;
+
+/// Corners of a region lie within so many weld tolerances of its plane: those of coplanar faces do, but for the weld.
+const FLATNESS: f64 = 2.0;
 
 /// An emitter that lost part of its place to another face.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,7 +43,7 @@ pub fn merged(scene: Cleaned, layers: &[Layer], report: &mut Report) -> (Cleaned
     let mut made: Vec<Face> = Vec::new();
     let mut scene = scene;
     for layer in layers.iter().filter(|layer| layer.sheets.len() > 1) {
-        // Faces too close to be told apart stay faces.
+        // Faces too close to be told apart stay faces, and so do slivers whose union is thinner than it is flat.
         let Ok((found, losers, area)) = regions_of(layer, &mut scene) else {
             report.count("planes not merged", 1);
             continue;
@@ -98,6 +102,13 @@ struct Region {
 }
 
 impl Region {
+    /// Whether the plane that the ring itself spans is that of its corners.
+    fn is_flat(&self, scene: &Cleaned) -> bool {
+        let (corners, tolerance) = (scene.places.corners(&self.corners), scene.places.tolerance());
+        let near = |plane: Plane| corners.iter().all(|&p| plane.distance(p).abs() <= FLATNESS * tolerance);
+        Plane::of_polygon(&corners).is_none_or(near)
+    }
+
     fn face(&self, layer: &Layer, scene: &Cleaned) -> Face {
         let face_of = |&sheet: &u32| &scene.faces[layer.sheets[sheet as usize].face as usize];
         let area = |face: &Face| polygon::area(&scene.places.corners(&face.corners));
@@ -137,7 +148,7 @@ fn regions_of(layer: &Layer, scene: &mut Cleaned) -> Result<(Vec<Region>, Losers
         (!face.two_sided).then_some((face.material, face.group))
     };
     let found = regions(&triangulation, class);
-    let regions = found
+    let regions: Vec<Region> = found
         .iter()
         .map(|triangles| {
             let mut sheets: Vec<u32> = triangles.iter().filter_map(|&t| winner(t)).collect();
@@ -149,6 +160,9 @@ fn regions_of(layer: &Layer, scene: &mut Cleaned) -> Result<(Vec<Region>, Losers
             Region { corners, sheets, area }
         })
         .collect();
+    if regions.iter().any(|region| !region.is_flat(scene)) {
+        return Err(Trouble::Crowded);
+    }
     let mut losers = Losers::new();
     for t in 0..triangulation.triangles.len() {
         let Some(winner) = winner(t) else { continue };

@@ -6,7 +6,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod common;
-use common::soup::{RELATIONS, Soup, Thing};
+use common::soup::{RELATIONS, Relation, Soup, Thing};
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 
@@ -59,48 +59,95 @@ fn ten_thousand_soups_survive() {
     assert!(faults.is_empty(), "{} of 10 seeds:\n{}", faults.len(), faults.join("\n"));
 }
 
-/// Faults by kind, of many soups, the first of each kind shrunk.
+/// The corpus of the fuzz target `arrangement`, on a stable compiler.
 #[test]
-#[ignore = "for looking"]
-fn survey() {
-    use proptest::strategy::ValueTree;
-    std::panic::set_hook(Box::new(|_| {}));
-    let count: u32 = std::env::var("SOUPS").map_or(1000, |n| n.parse().unwrap());
-    let seed: u8 = std::env::var("SEED").map_or(1, |n| n.parse().unwrap());
-    let random = TestRng::from_seed(RngAlgorithm::ChaCha, &[seed; 32]);
-    let mut runner = TestRunner::new_with_rng(ProptestConfig::default(), random);
-    let mut kinds = std::collections::BTreeMap::<String, usize>::new();
-    let kind = |fault: &str| fault.splitn(3, ':').take(2).collect::<Vec<&str>>().join(":");
-    for k in 0..count {
-        let mut tree = any_soup().new_tree(&mut runner).unwrap();
-        for fault in tree.current().faults() {
-            let own = kind(&fault);
-            let n = kinds.entry(own.clone()).or_default();
-            *n += 1;
-            let n = *n;
-            println!("{k}: {}", &fault[..fault.len().min(300)]);
-            if n <= 4 {
-                let fails = |soup: &Soup| soup.faults().iter().any(|fault| kind(fault) == own);
-                let mut least = tree.current();
-                let mut tries = 0;
-                while tries < 300 && tree.simplify() {
-                    tries += 1;
-                    if fails(&tree.current()) {
-                        least = tree.current();
-                        continue;
-                    }
-                    while tries < 300 && tree.complicate() {
-                        tries += 1;
-                        if fails(&tree.current()) {
-                            least = tree.current();
-                            break;
-                        }
-                    }
-                }
-                println!("  least: {least:?}\n  {:?}", least.faults());
-                break;
-            }
+fn soups_of_the_fuzz_corpus_survive() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus/arrangement");
+    let mut paths: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    assert!(paths.len() >= 12, "{paths:?}");
+    for path in paths {
+        let soup = Soup::from_bytes(&std::fs::read(&path).unwrap());
+        let faults = soup.faults();
+        assert!(faults.is_empty(), "{}: {soup:?}: {faults:#?}", path.display());
+    }
+}
+
+/// Soups that once failed, shrunk, with what failed.
+#[test]
+fn soups_that_failed_survive() {
+    let thing = |low: [f64; 3], size: [f64; 3], relation: Relation, tilt: f64| Thing {
+        low,
+        size,
+        relation,
+        bottom: false,
+        lamp: false,
+        tilt,
+    };
+    let (origin, cube) = ([0.0; 3], [0.1; 3]);
+    let soups: [(&str, Vec<Thing>, f64); 5] = [
+        (
+            "a sliver lies in the planes of two walls that are not coplanar",
+            vec![
+                thing(origin, cube, Relation::Again, 0.0),
+                thing(origin, cube, Relation::NearlyParallel, 0.3541061813062392),
+                thing(origin, [0.1, 1e-6, 1e-6], Relation::Beside, 0.0),
+            ],
+            0.0,
+        ),
+        (
+            "two edges within the tolerance of each other want the same point",
+            vec![
+                thing(origin, cube, Relation::Again, 0.0),
+                thing(
+                    [0.3197804762069433, 0.0, -0.436685818902924],
+                    [0.5164361474479929, 0.1, 1.0295525118082773],
+                    Relation::Sliver,
+                    0.9903873493785659,
+                ),
+            ],
+            3.9664026995071686,
+        ),
+        (
+            "a triangle without area is left out",
+            vec![
+                thing(origin, cube, Relation::NearlyParallel, -0.3976731647648),
+                thing(origin, cube, Relation::Again, -0.38575020161878437),
+                thing(origin, cube, Relation::NearlyParallel, 0.7463360013173072),
+            ],
+            1.6418490384337356,
+        ),
+        (
+            "two places a hair further apart than the tolerance lie on one edge",
+            vec![
+                thing(origin, cube, Relation::NearlyParallel, -0.1671631314757491),
+                thing(origin, cube, Relation::NearlyParallel, -0.24686785115750787),
+            ],
+            4.976627027126132,
+        ),
+        (
+            "the union of two slivers is thinner than it is flat",
+            vec![
+                thing(
+                    [0.46278213479555214, 0.0, 0.9662923137454198],
+                    [1.0690497764775746, 0.1, 0.0008318530277179792],
+                    Relation::Sliver,
+                    0.0,
+                ),
+                thing(
+                    [0.7974735588038837, 0.0, 0.5079492992594193],
+                    [0.0007912327954426657, 0.1, 0.4634294502901952],
+                    Relation::Sliver,
+                    -0.0479927386871456,
+                ),
+            ],
+            0.0,
+        ),
+    ];
+    for (cause, things, turn) in soups {
+        for power in [-6, 0, 6] {
+            let faults = Soup { things: things.clone(), turn, power }.faults();
+            assert!(faults.is_empty(), "{cause}: {faults:#?}");
         }
     }
-    println!("{count}: {kinds:#?}");
 }
