@@ -5,6 +5,7 @@ use crate::clean::Cleaned;
 use crate::conform::EdgeSplit;
 use crate::contact::{ContactLine, Pieces, contact_lines};
 use crate::discontinuity::{DrawnLine, Order};
+use crate::frame::stepped;
 use crate::given::drawn;
 use crate::hidden::{HIDDEN, HiddenParts, draw_contacts};
 use crate::patch::{Patch, PatchElement, PatchLine};
@@ -153,7 +154,10 @@ impl Drawing {
         let rings = layer
             .sheets
             .iter()
-            .map(|sheet| sheet.ring.iter().map(|&p| layer.frame.flatten(scene.places.position(p))).collect())
+            .map(|sheet| {
+                let at = |&p: &u32| stepped(layer.frame.flatten(scene.places.position(p)));
+                sheet.ring.iter().map(at).collect()
+            })
             .collect();
         let (mut area, mut losers) = (0.0, std::collections::BTreeMap::new());
         for (t, triangle) in triangulation.triangles.iter().enumerate() {

@@ -5,7 +5,7 @@
 //! it (snap rounding in the sense of Hobby 1999, without the pixel grid). Leading an edge through a point moves it,
 //! so the search is repeated until nothing changes.
 
-use crate::frame::{Frame, nearest_on_segment, turn};
+use crate::frame::{Frame, nearest_on_segment, stepped, turn};
 use crate::places::Places;
 use crate::triangulation::{Triangulation, Trouble};
 use glam::{DVec2, DVec3};
@@ -75,9 +75,9 @@ impl PlanarGraph {
         self.point(Point { uv: frame.flatten(position), position, place: Some(place) })
     }
 
-    /// Adds a point.
+    /// Adds a point; its coordinates are [`stepped`].
     pub fn point(&mut self, point: Point) -> u32 {
-        self.points.push(point);
+        self.points.push(Point { uv: stepped(point.uv), ..point });
         (self.points.len() - 1) as u32
     }
 
@@ -258,9 +258,9 @@ impl PlanarGraph {
                 && let Some((along_i, along_j)) = self.crossing(i, j)
             {
                 let crossing = self.along(i, along_i);
-                let point = places.insert(crossing.uv.extend(0.0));
+                let point = places.insert(stepped(crossing.uv).extend(0.0));
                 if point as usize == self.points.len() {
-                    self.points.push(crossing);
+                    self.point(crossing);
                 }
                 splits[i].push((along_i, point));
                 splits[j].push((along_j, point));

@@ -7,7 +7,7 @@
 //! the same count.
 
 use crate::conform::EdgeSplit;
-use crate::frame::{Frame, turn};
+use crate::frame::{Frame, stepped, turn};
 use crate::planar::{Contact, PlanarGraph, Point};
 use crate::triangulation::{Triangle, Triangulation, Trouble, grid_place};
 use glam::{DVec2, DVec3};
@@ -138,7 +138,7 @@ impl Refinement {
             let size = ends.iter().map(|&p| self.sizes[p as usize]).fold(0.0, f64::max);
             let mut stops = Vec::new();
             for &(_, position) in points {
-                let point = Point { uv: frame.flatten(position), position, place: None };
+                let point = Point { uv: stepped(frame.flatten(position)), position, place: None };
                 let stop = *known.entry(grid_place(point.uv)).or_insert_with(|| {
                     self.free.push(false);
                     self.sizes.push(size);
@@ -172,7 +172,7 @@ impl Refinement {
         for (point, position) in moves {
             let point = &mut self.graph.points[point];
             if point.position != position {
-                let uv = frame.flatten(position);
+                let uv = stepped(frame.flatten(position));
                 far |= grid_place(uv) != grid_place(point.uv);
                 (point.uv, point.position) = (uv, position);
             }
