@@ -217,11 +217,18 @@ impl Drawing {
         Ok(self.owned(refinement, triangulation))
     }
 
-    /// Halves the edges of the triangles `marked` (by their number in `triangles`) that are at least twice as long
-    /// as `shortest`, in units of length. `false` where there are none.
-    pub fn halve(&self, triangles: &mut Triangles, marked: &[usize], shortest: f64) -> Result<bool, Trouble> {
+    /// Halves the edges of the triangles `marked` (by their number in `triangles`) that are at least the part `long` of
+    /// their longest and twice as long as `shortest`, in units of length. `false` where there are none.
+    pub fn halve(
+        &self,
+        triangles: &mut Triangles,
+        marked: &[usize],
+        long: f64,
+        shortest: f64,
+    ) -> Result<bool, Trouble> {
         let shortest = shortest / self.layer.frame.size;
-        let halved = triangles.refinement.halve_triangles(&triangles.triangulation, marked, shortest)?;
+        let halved =
+            triangles.refinement.halve_triangles(&triangles.triangulation, marked, long, shortest)?;
         let Some(triangulation) = halved else { return Ok(false) };
         let refinement = triangles.refinement.clone();
         *triangles = self.owned(refinement, triangulation);

@@ -18,8 +18,6 @@ use std::collections::{BTreeSet, HashMap};
 const SMALLEST_ANGLE: f64 = 25.0;
 /// The longest edges of neighbours differ by no more than this factor, above the floor.
 const GRADING: f64 = 2.0;
-/// Of a triangle to be made smaller all edges at least this part of the longest are halved: a strip stays one wide.
-const LONG: f64 = 0.6;
 /// Rounds of adding points; each settles most of what the one before left.
 const ROUNDS: usize = 12;
 /// Rounds of smoothing before and after.
@@ -90,12 +88,14 @@ impl Refinement {
         self.shorten(triangulation)
     }
 
-    /// Halves the long edges of the `marked` triangles, in units of the frame down to `shortest`, and widens the small
-    /// angles that this leaves around them. `None` where nothing can be halved.
+    /// Halves the edges of the `marked` triangles that are at least the part `long` of their longest, in units of the
+    /// frame down to `shortest`, and widens the small angles that this leaves around them. `None` where nothing can be
+    /// halved.
     pub fn halve_triangles(
         &mut self,
         triangulation: &Triangulation,
         marked: &[usize],
+        long: f64,
         shortest: f64,
     ) -> Result<Option<Triangulation>, Trouble> {
         let (mut seen, mut changes) = (BTreeSet::new(), Vec::new());
@@ -105,7 +105,7 @@ impl Refinement {
             for k in 0..3 {
                 let (a, b) = (triangle.corners[k], triangle.corners[(k + 1) % 3]);
                 let length = self.uv(a).distance(self.uv(b));
-                if length >= (LONG * longest).max(2.0 * shortest) && seen.insert((a.min(b), a.max(b))) {
+                if length >= (long * longest).max(2.0 * shortest) && seen.insert((a.min(b), a.max(b))) {
                     changes.push((self.middle(triangle, k), 0.5 * length));
                 }
             }

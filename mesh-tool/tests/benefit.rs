@@ -129,8 +129,8 @@ fn aligned_squares_at_equal_nodes_are_many_times_better_with_lines() {
     let (linear_rms, _) = shadow.error(&triangles, true);
     let (grid_rms, _) = shadow.error(&shadow.grid(32), true);
     assert!(nodes <= 1150, "{nodes}");
-    // Measured 31 times: the grid's own root mean square is small, for most of the floor is evenly lit.
-    assert!(28.0 * rms < uniform_rms, "{rms} against {uniform_rms}");
+    // Measured 41 and 70 times.
+    assert!(40.0 * rms < uniform_rms, "{rms} against {uniform_rms}");
     assert!(40.0 * most < uniform_most, "{most} against {uniform_most}");
     assert!(linear_nodes <= 1150, "{linear_nodes}");
     assert!(2.0 * linear_rms < grid_rms, "{linear_rms} against {grid_rms}");
