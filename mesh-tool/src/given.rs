@@ -99,7 +99,7 @@ fn cut(
     let seam = |edge: u32| !graph.edges[edge as usize].contacts.is_empty();
     let own: Vec<u32> = layer.sheets[index as usize].ring.clone();
     let keep = |point: u32| graph.points[point as usize].place.is_some_and(|place| own.contains(&place));
-    let rings = convex_pieces(&graph, &triangulation, held, seam, keep);
+    let rings = convex_pieces(&layer.frame, &graph, &triangulation, held, seam, keep);
     let lost =
         (0..triangulation.triangles.len()).filter(|&t| triangulation.winding(t, index) > 0 && !held(t));
     let area = |t: usize| {
