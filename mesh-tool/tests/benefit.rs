@@ -161,3 +161,35 @@ fn tolerance_is_met_with_no_more_elements_than_it_takes() {
     let (coarse, fine) = (count(0.1), count(0.01));
     assert!(coarse < fine && fine < 1000, "{coarse} {fine}");
 }
+
+/// Table for BENCHMARKING.md: error of the quadratic interpolant of direct light on the floor, relative to the brightest
+/// place, for the ways of making elements.
+#[test]
+#[ignore = "prints a table"]
+fn interpolation_error_per_element() {
+    let ways = [
+        ("adaptive", Some(1e-9), Order::Off),
+        ("lines d1", None, Order::D1),
+        ("lines d2", None, Order::D2),
+        ("both, d1", Some(1e-9), Order::D1),
+        ("both, d2", Some(1e-9), Order::D2),
+    ];
+    for (name, shadow) in [("S1", Shadow::aligned_squares()), ("penumbra", Shadow::penumbra())] {
+        for cells in [8, 12, 16, 24] {
+            let (rms, most) = shadow.error(&shadow.grid(cells), false);
+            println!("{name} | uniform | {} | {rms:.1e} | {most:.1e}", (2 * cells + 1).pow(2));
+        }
+        for (way, tolerance, order) in ways {
+            for count in [140, 310, 550, 1250] {
+                let lines = Options { tolerance, discontinuity: Some(order), ..elements(count) };
+                // Equal elements along the lines, about as many.
+                let even = max_edge(1.9 * (shadow.floor[1] - shadow.floor[0]) / f64::from(count).sqrt());
+                let even = Options { discontinuity: Some(order), ..even };
+                let options = if tolerance.is_some() { lines } else { even };
+                let (triangles, nodes) = floor_of(&made(&scene_of(&shadow.text), options).0);
+                let (rms, most) = shadow.error(&triangles, false);
+                println!("{name} | {way} | {nodes} | {rms:.1e} | {most:.1e}");
+            }
+        }
+    }
+}
