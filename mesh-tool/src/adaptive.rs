@@ -33,8 +33,9 @@ const ROUNDS: usize = 60;
 const ADDED: f64 = 4.5;
 /// One round uses up at most this part of the room left.
 const HASTE: f64 = 0.12;
-/// Power of the area in the order of division: half would serve the root mean square alone, 0 the largest error.
-const AREA_POWER: f64 = 0.4;
+/// Of a triangle only the longest edge is halved, and what is as long but for rounding (Rivara 1984): triangles follow
+/// light that changes one way only. Halving all long edges took 1.3 times the error for as many nodes.
+const LONG: f64 = 0.999;
 /// A budget is used up when this part of it is.
 const ENOUGH: f64 = 0.97;
 
@@ -97,21 +98,20 @@ pub fn refine(
             squares += area * centre * centre;
         }
         let mean = if power > 0.0 { squares / power } else { 1.0 };
-        let errors: Vec<f64> = samples.iter().map(|s| error(s, wish.linear) / mean).collect();
-        worst = errors.iter().copied().fold(0.0, f64::max);
+        let errors: Vec<Missed> = samples.iter().map(|s| missed(s, wish.linear)).collect();
+        worst = errors.iter().map(|missed| missed.most / mean).fold(0.0, f64::max);
         let room = wish.most - corners.len() as f64;
         let mut order: Vec<usize> = (0..errors.len())
-            .filter(|&k| errors[k] > wish.tolerance && !given_up.contains(&key(&corners[k])))
+            .filter(|&k| errors[k].most / mean > wish.tolerance && !given_up.contains(&key(&corners[k])))
             .collect();
         if order.is_empty() || room <= (1.0 - ENOUGH) * wish.most || rounds == ROUNDS {
             break;
         }
-        // Of equal errors the one over more area counts more.
-        let whole: f64 = corners.iter().map(|corners| polygon::area(corners)).sum();
+        // The order of their parts of the root mean square error.
         let rank: Vec<f64> = corners
             .iter()
             .zip(&errors)
-            .map(|(corners, error)| error * (polygon::area(corners) / whole).powf(AREA_POWER))
+            .map(|(corners, missed)| missed.squares * polygon::area(corners))
             .collect();
         order.sort_by(|&a, &b| rank[b].total_cmp(&rank[a]).then(a.cmp(&b)));
         order.truncate(((HASTE * room / added).ceil() as usize).max(1));
@@ -126,7 +126,7 @@ pub fn refine(
         meshes.par_iter_mut().zip(drawings).zip(&marked).enumerate().try_for_each(
             |(layer, ((mesh, drawing), marked))| match marked.is_empty() {
                 true => Ok(()),
-                false => drawing.halve(mesh, marked, shortest).map(|_| ()).map_err(|t| (layer, t)),
+                false => drawing.halve(mesh, marked, LONG, shortest).map(|_| ()).map_err(|t| (layer, t)),
             },
         )?;
         let end: usize = meshes.iter().map(Triangles::count).sum();
@@ -165,10 +165,17 @@ pub fn interpolated(nodes: &[f64; 6], [u, v, w]: [f64; 3], linear: bool) -> f64 
         + 4.0 * (u * v * nodes[3] + v * w * nodes[4] + w * u * nodes[5])
 }
 
-fn error(samples: &Samples, linear: bool) -> f64 {
+/// What interpolation over one triangle misses at the test places.
+struct Missed {
+    most: f64,
+    squares: f64,
+}
+
+fn missed(samples: &Samples, linear: bool) -> Missed {
     let nodes: [f64; 6] = std::array::from_fn(|k| samples[k]);
     let miss = |k: usize| (interpolated(&nodes, TESTS[k], linear) - samples[6 + k]).abs();
-    (0..TESTS.len()).map(miss).fold(0.0, f64::max)
+    let most = (0..TESTS.len()).map(miss).fold(0.0, f64::max);
+    Missed { most, squares: (0..TESTS.len()).map(|k| miss(k) * miss(k)).sum() }
 }
 
 fn key(corners: &[DVec3; 3]) -> Key {

@@ -3,9 +3,11 @@
 use crate::clean::{Cleaned, Face, Member};
 use crate::cluster;
 use crate::contact::Pieces;
+use crate::flat::without_flat;
 use crate::frame::contains;
 use crate::nodes::{self, Element};
 use crate::patch::Patch;
+use crate::places::Places;
 use crate::sheets::Layer;
 use geometry::polygon;
 use glam::DVec3;
@@ -18,8 +20,8 @@ use std::collections::HashMap;
 /// Puts the mesh together. With `six_nodes` every edge gets a node in its middle.
 ///
 /// New corners that lie within the weld tolerance of a place become that place, so that walls share the vertices of
-/// their common edge. An element that has no area any more after that was thinner than the tolerance: it is left out
-/// and counted in the second result.
+/// their common edge. An element that has no area any more after that was thinner than the tolerance: it is left out,
+/// counted in the second result, and what lay beyond it meets what is left.
 pub fn assemble(
     scene: &Scene,
     cleaned: Cleaned,
@@ -35,6 +37,7 @@ pub fn assemble(
     for (number, (layer, patch)) in patches.iter().enumerate() {
         let vertices: Vec<u32> =
             patch.points.iter().map(|p| p.place.unwrap_or_else(|| places.insert(p.position))).collect();
+        let mut own = Vec::new();
         for element in &patch.elements {
             let sheet = &layer.sheets[element.sheet as usize];
             let mut corners: Vec<u32> = element.corners.iter().map(|&p| vertices[p as usize]).collect();
@@ -45,27 +48,38 @@ pub fn assemble(
                     seams.remove(k);
                 }
             }
-            let area = polygon::vector_area(&places.corners(&corners)).dot(layer.frame.plane.normal);
-            if corners.len() < 3 || area <= 0.0 {
-                flat += 1;
-                continue;
-            }
-            if layer.reversed {
+            let surface = (number as u32, sheet.material);
+            let element = Element { corners, seams, face: sheet.face, side: sheet.side, surface };
+            own.extend(convex_parts(element, &places, layer.frame.plane.normal));
+        }
+        let area = |ring: &[u32]| polygon::vector_area(&places.corners(ring)).dot(layer.frame.plane.normal);
+        let mut with_area = without_flat(own, area, |place| places.position(place));
+        flat += with_area.flat;
+        if layer.reversed {
+            for Element { corners, seams, .. } in &mut with_area.elements {
                 // The edge after the last corner stays the last one.
                 corners.reverse();
                 let n = seams.len();
                 seams[..n - 1].reverse();
             }
-            let surface = (number as u32, sheet.material);
-            elements.push(Element { corners, seams, face: sheet.face, side: sheet.side, surface });
         }
-        lines.extend(patch.lines.iter().map(|line| Line {
-            from: VertexId(vertices[line.from as usize]),
-            to: VertexId(vertices[line.to as usize]),
-            face: FaceId(layer.sheets[line.sheet as usize].face),
-            order: line.order,
-            source: FaceId(line.source),
-        }));
+        elements.append(&mut with_area.elements);
+        for line in &patch.lines {
+            let mut open = vec![[line.from, line.to].map(|point| vertices[point as usize])];
+            while let Some([from, to]) = open.pop() {
+                if let Some(&middle) = with_area.middles.get(&(from.min(to), from.max(to))) {
+                    open.extend([[from, middle], [middle, to]]);
+                    continue;
+                }
+                lines.push(Line {
+                    from: VertexId(from),
+                    to: VertexId(to),
+                    face: FaceId(layer.sheets[line.sheet as usize].face),
+                    order: line.order,
+                    source: FaceId(line.source),
+                });
+            }
+        }
         lines.retain(|line: &Line| line.from != line.to);
         for &(sheet, area) in &patch.hidden {
             hidden_areas[layer.sheets[sheet as usize].face as usize] += area;
@@ -132,6 +146,28 @@ pub fn assemble(
         input_face_count: scene.faces.len() as u32,
     };
     (mesh, flat)
+}
+
+/// A corner may turn this far the wrong way, as a sine: ten times what rounding of the corners (1e-16 of the scene) can do
+/// between edges as short as the weld tolerance.
+const STRAIGHT: f64 = 1e-6;
+
+/// The element, or, where joining places that are one bent it inwards at a corner, triangles around that corner.
+fn convex_parts(element: Element, places: &Places, normal: DVec3) -> Vec<Element> {
+    let n = element.corners.len();
+    let inward = |&k: &usize| {
+        let [a, b, c] = [n - 1, 0, 1].map(|step| places.position(element.corners[(k + step) % n]));
+        (b - a).cross(c - b).dot(normal) < -STRAIGHT * a.distance(b) * b.distance(c)
+    };
+    let Some(k) = (0..n).find(inward).filter(|_| n > 3) else { return vec![element] };
+    let part = |j: usize| {
+        let ring = [k, (k + j) % n, (k + j + 1) % n];
+        let seams =
+            [j == 1 && element.seams[k], element.seams[ring[1]], j == n - 2 && element.seams[ring[2]]];
+        let corners = ring.map(|corner| element.corners[corner]);
+        Element { corners: corners.to_vec(), seams: seams.to_vec(), ..element.clone() }
+    };
+    (1..n - 1).map(part).collect()
 }
 
 /// The scene's face that an element belongs to: of a region the first face that holds its middle.

@@ -11,6 +11,7 @@ use crate::given::as_given;
 use crate::light::Light;
 use crate::meshed::{Drawing, Drawn, Triangles};
 use crate::patch::Patch;
+use crate::quality::measure;
 use crate::regions::{LostEmitter, merged};
 use crate::sheets::{Layer, layers};
 use crate::sized::sized;
@@ -23,7 +24,6 @@ use geometry::plane::PLANARITY;
 use geometry::polygon;
 use glam::DVec3;
 use interchange::digest::Digest;
-use interchange::ids::VertexId;
 use interchange::mesh::Mesh;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
@@ -31,7 +31,7 @@ use interchange::scene::Scene;
 use interchange::tables::number;
 use interchange::{Error, Result};
 use rayon::prelude::*;
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeSet, HashSet};
 use std::time::Instant;
 
 /// What the elements should be. With no size, tolerance or order of lines the faces are elements as given; with several
@@ -68,9 +68,9 @@ impl Options {
         sized || self.discontinuity.is_some()
     }
 
-    /// Highest order of lines that is drawn. Irradiance gathered at reference points was off by (RMS, without lines, d1, d2)
-    /// 0.0225, 0.0220, 0.0164 in the furnished room (6000 elements) and 0.0040, 0.0040, 0.0044 in the Cornell box (3000); means
-    /// over the Cornell box's faces by up to 0.8, 0.8, 1.2 % (2500). Curvature lines pay where elements are many.
+    /// Highest order of lines that is drawn. Curvature lines do not pay in scenes with few elements for each: in the Cornell box
+    /// of 1000 and 2000 elements irradiance at reference points is off by 1.01 and 0.64 % with slope lines, by 1.22 and
+    /// 0.68 % with curvature lines besides (BENCHMARKING.md).
     pub fn order(&self) -> Order {
         self.discontinuity.unwrap_or(Order::D1)
     }
@@ -113,6 +113,7 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
     let mut cleaned = clean(scene, &options.no_clean, report)?;
     let mut layers = layers_of(&cleaned, options);
     note(report, "clean", start);
+    let mut overlapped = 0.0;
     let name = |faces: &[Face], face: u32, trouble: Trouble| trouble.at(scene, faces[face as usize].line);
 
     let pieces;
@@ -124,7 +125,8 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
         let solids = if off.leaves(Step::Hidden) { Solids::new(&cleaned) } else { Solids::default() };
         report.count("closed bodies", solids.len());
         if off.leaves(Step::Regions) && off.leaves(Step::Meet) && off.leaves(Step::Overlap) {
-            let (merged, lost) = merged(cleaned, &layers, report);
+            let (merged, lost, area) = merged(cleaned, &layers, report);
+            overlapped = area;
             lost.iter().for_each(|loss| warn_of_lost_emitter(scene, loss, report));
             cleaned = merged;
             layers = layers_of(&cleaned, options);
@@ -163,7 +165,7 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
         let light = lit.then(|| Light::new(&cleaned, &pieces)).flatten();
         let name = |face: u32, trouble: Trouble| name(&cleaned.faces, face, trouble);
         let tolerance = cleaned.places.tolerance();
-        let mut meshes = sized(scene, &drawings, light.as_ref(), options, tolerance, report, &name)?;
+        let mut meshes = sized(scene, &drawings, light.as_ref(), options, &cleaned.places, report, &name)?;
         let made = |meshes: &[Triangles]| -> Vec<(&Layer, Patch)> {
             let patches = drawings.par_iter().zip(meshes).map(|(drawing, mesh)| drawing.patch(mesh));
             drawings.iter().map(Drawing::layer).zip(patches.collect::<Vec<_>>()).collect()
@@ -187,7 +189,7 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
                 }
             }
             if off.leaves(Step::Meet) {
-                conform::meet(&drawings, &mut meshes, tolerance);
+                conform::meet(&drawings, &mut meshes, &cleaned.places);
             }
             report.count("elements kept", kept(&base, &meshes));
         }
@@ -223,6 +225,8 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
     report.count("hidden parts", total(|p| p.hidden.len()));
     let hidden: f64 = patches.iter().flat_map(|(_, patch)| &patch.hidden).map(|(_, area)| area).sum();
     report.estimate("hidden area", hidden.abs());
+    overlapped += patches.iter().map(|(_, patch)| patch.overlapped).sum::<f64>();
+    report.estimate("overlapped area", overlapped);
     let (mesh, flat) = assemble(scene, cleaned, &pieces, &patches, options.meshes() && !options.linear);
     report.count("pieces without area left out", flat);
     note(report, "assemble", start);
@@ -311,125 +315,4 @@ pub fn convex_pieces_of_faces(scene: &Scene, cleaned: &Cleaned) -> Result<Pieces
                 .map_err(|trouble| trouble.at(scene, face.line))
         })
         .collect()
-}
-
-/// Counts and measures the finished mesh.
-fn measure(mesh: &Mesh, report: &mut Report) {
-    report.count("elements", mesh.element_count());
-    report.count("vertices", mesh.vertices.len());
-    report.count("nodes", mesh.node_vertices.len());
-    report.count("lines", mesh.lines.len());
-    let quality = Quality::of(mesh);
-    report.estimate("area of faces", quality.face_area);
-    report.estimate("area of elements", quality.element_area);
-    report.estimate("longest edge", quality.longest_edge);
-    report.estimate("smallest angle deg", quality.smallest_angle_deg);
-    report.estimate("median smallest angle deg", quality.median_smallest_angle_deg);
-    report.count("elements below 25 deg", quality.narrow);
-    report.count("elements below 25 deg that no line or border forces", quality.narrow_freely);
-    report.count("neighbours of more than twice the size", quality.uneven);
-}
-
-/// Shape of the elements of a mesh.
-#[derive(Debug, Clone, Copy)]
-pub struct Quality {
-    /// Area of the faces, both sides of two-sided ones.
-    pub face_area: f64,
-    /// Area of the elements.
-    pub element_area: f64,
-    /// Longest edge of an element.
-    pub longest_edge: f64,
-    /// Smallest angle of any element, degrees.
-    pub smallest_angle_deg: f64,
-    /// Median over the elements of their smallest angles, degrees.
-    pub median_smallest_angle_deg: f64,
-    /// Elements with an angle below 25 degrees.
-    pub narrow: usize,
-    /// Of these, elements whose smallest angle is not one between two lines or borders.
-    pub narrow_freely: usize,
-    /// Pairs of elements across an edge, the longest edge of one more than twice that of the other.
-    pub uneven: usize,
-}
-
-impl Quality {
-    /// Measures a mesh.
-    pub fn of(mesh: &Mesh) -> Quality {
-        let faces = (0..mesh.face_count()).map(interchange::ids::FaceId::new);
-        let face_area = faces
-            .map(|face| {
-                let sides = 1.0 + f64::from(u8::from(mesh.is_two_sided(face)));
-                sides * polygon::area(&mesh.face_corners(face))
-            })
-            .sum();
-        let lines: HashSet<(u32, u32)> = mesh.lines.iter().map(|l| sorted(l.from.0, l.to.0)).collect();
-        let mut sides: HashMap<(u32, u32, u32), Vec<f64>> = HashMap::new();
-        let longest =
-            |corners: &[DVec3]| polygon::edges(corners).map(|(a, b)| a.distance(b)).fold(0.0, f64::max);
-        for element in mesh.element_ids() {
-            let ring = mesh.elements.row(element.index());
-            let length = longest(&mesh.element_corners(element));
-            for (a, b) in edges_of(ring) {
-                let face = mesh.element_faces[element.index()].0;
-                sides.entry((face, a, b)).or_default().push(length);
-            }
-        }
-        let uneven = sides.values().filter(|l| l.len() == 2 && l[0].max(l[1]) > 2.0 * l[0].min(l[1])).count();
-        let (mut element_area, mut longest_edge, mut angles) = (0.0, 0.0f64, Vec::new());
-        let (mut narrow, mut narrow_freely) = (0, 0);
-        for element in mesh.element_ids() {
-            let corners = mesh.element_corners(element);
-            element_area += polygon::area(&corners);
-            longest_edge = longest_edge.max(longest(&corners));
-            let (angle, at) = smallest_angle(&corners);
-            angles.push(angle.to_degrees());
-            if angle.to_degrees() < NARROW_DEG {
-                narrow += 1;
-                let ring = mesh.elements.row(element.index());
-                let face = mesh.element_faces[element.index()].0;
-                let edges: Vec<(u32, u32)> = edges_of(ring).collect();
-                let given = |(a, b): (u32, u32)| lines.contains(&(a, b)) || sides[&(face, a, b)].len() == 1;
-                let n = edges.len();
-                narrow_freely += usize::from(!(given(edges[at]) && given(edges[(at + n - 1) % n])));
-            }
-        }
-        angles.sort_by(f64::total_cmp);
-        Quality {
-            face_area,
-            element_area,
-            longest_edge,
-            smallest_angle_deg: angles.first().copied().unwrap_or(0.0),
-            median_smallest_angle_deg: angles.get(angles.len() / 2).copied().unwrap_or(0.0),
-            narrow,
-            narrow_freely,
-            uneven,
-        }
-    }
-}
-
-/// Elements with a smaller angle are narrow, degrees.
-const NARROW_DEG: f64 = 24.999_999;
-
-fn sorted(a: u32, b: u32) -> (u32, u32) {
-    (a.min(b), a.max(b))
-}
-
-fn edges_of(ring: &[VertexId]) -> impl Iterator<Item = (u32, u32)> + '_ {
-    (0..ring.len()).map(|k| sorted(ring[k].0, ring[(k + 1) % ring.len()].0))
-}
-
-/// The smallest angle of a polygon, radians, and the corner it is at.
-pub fn smallest_angle(corners: &[DVec3]) -> (f64, usize) {
-    let n = corners.len();
-    let angle = |k: usize| {
-        let (a, b) = (corners[(k + 1) % n] - corners[k], corners[(k + n - 1) % n] - corners[k]);
-        a.cross(b).length().atan2(a.dot(b))
-    };
-    let mut best = (f64::INFINITY, 0);
-    for k in 0..n {
-        let angle = angle(k);
-        if angle < best.0 {
-            best = (angle, k);
-        }
-    }
-    best
 }

@@ -119,8 +119,11 @@ pub fn clean(scene: &Scene, off: &Off<Step>, report: &mut Report) -> Result<Clea
             }
         }
     }
-    let (mut faces, dropped) =
-        if off.leaves(Step::Duplicates) { without_duplicates(faces, scene, report) } else { (faces, 0) };
+    let (mut faces, dropped) = if off.leaves(Step::Duplicates) {
+        without_duplicates(faces, &places, scene, report)
+    } else {
+        (faces, 0)
+    };
     let oriented = if off.leaves(Step::Orient) { orient(&mut faces, &places) } else { Default::default() };
 
     report.count("dropped zero area", without_area);
@@ -165,7 +168,7 @@ pub fn clean(scene: &Scene, off: &Off<Step>, report: &mut Report) -> Result<Clea
 }
 
 /// Without corners that repeat the one before them, the last one counting as before the first.
-fn without_repeats(mut corners: Vec<u32>) -> Vec<u32> {
+pub fn without_repeats(mut corners: Vec<u32>) -> Vec<u32> {
     corners.dedup();
     while corners.len() > 1 && corners.first() == corners.last() {
         corners.pop();

@@ -1,10 +1,10 @@
 //! Convex pieces of a region made of triangles: neighbours are joined while the result stays convex
 //! (Hertel & Mehlhorn 1983: at most two pieces per reflex corner and one more).
 
-use crate::frame::turn;
+use crate::frame::{Frame, turn};
 use crate::places::Places;
 use crate::planar::{Border, PlanarGraph};
-use crate::triangulation::{Triangulation, Trouble};
+use crate::triangulation::{RESOLUTION, Triangulation, Trouble};
 use glam::DVec2;
 use std::collections::HashMap;
 
@@ -15,13 +15,15 @@ const STRAIGHT: f64 = 1e-9;
 /// Rings of points, counter-clockwise, that cover the triangles `inside`; no two are joined across an edge that
 /// is a `seam`. Points where a ring runs straight on are left out unless `keep` wants them.
 pub fn convex_pieces(
+    frame: &Frame,
     graph: &PlanarGraph,
     triangulation: &Triangulation,
     inside: impl Fn(usize) -> bool,
     seam: impl Fn(u32) -> bool,
     keep: impl Fn(u32) -> bool,
 ) -> Vec<Vec<u32>> {
-    let position = |point: u32| graph.points[point as usize].uv;
+    // Not the stepped coordinates of the graph: between close points a step is a bend.
+    let position = |point: u32| frame.flatten(graph.points[point as usize].position);
     let mut rings: Vec<Vec<u32>> = Vec::new();
     let mut owner: HashMap<(u32, u32), usize> = HashMap::new();
     let mut diagonals = Vec::new();
@@ -76,18 +78,22 @@ fn join(
 }
 
 /// Convex pieces of one polygon, as rings of its places. `corners` runs counter-clockwise in the plane of `frame`.
-pub fn pieces_of_polygon(
-    frame: &crate::frame::Frame,
-    corners: &[u32],
-    places: &Places,
-) -> Result<Vec<Vec<u32>>, Trouble> {
+pub fn pieces_of_polygon(frame: &Frame, corners: &[u32], places: &Places) -> Result<Vec<Vec<u32>>, Trouble> {
     let mut graph = PlanarGraph::default();
     let ring: Vec<u32> =
         corners.iter().map(|&place| graph.corner(frame, place, places.position(place))).collect();
     graph.ring(&ring, Border { sheet: 0, forward: true });
-    let (graph, triangulation) = graph.arrange(places.tolerance() / frame.size)?;
-    let rings =
-        convex_pieces(&graph, &triangulation, |t| triangulation.winding(t, 0) > 0, |_| false, |_| true);
+    // As fine as can be: a border that is bent where it passes a corner closely would not keep its area.
+    let fine = graph.clone().arrange(RESOLUTION);
+    let (graph, triangulation) = fine.or_else(|_| graph.arrange(places.tolerance() / frame.size))?;
+    let rings = convex_pieces(
+        frame,
+        &graph,
+        &triangulation,
+        |t| triangulation.winding(t, 0) > 0,
+        |_| false,
+        |_| true,
+    );
     let places_of = |ring: Vec<u32>| -> Option<Vec<u32>> {
         ring.into_iter().map(|p| graph.points[p as usize].place).collect()
     };
@@ -145,7 +151,6 @@ fn without_straight_corners(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::frame::Frame;
     use geometry::plane::Plane;
     use geometry::polygon;
     use glam::DVec3;

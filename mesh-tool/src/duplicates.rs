@@ -1,13 +1,20 @@
 //! Faces given twice: the same corners the same way round.
 
 use crate::clean::Face;
+use crate::places::Places;
+use geometry::polygon;
 use interchange::report::Report;
 use interchange::scene::Scene;
 use std::collections::HashMap;
 
 /// Drops faces with the corners and orientation of an earlier one; an emitter wins over what does not emit. Returns
 /// what is left and how many were dropped.
-pub fn without_duplicates(faces: Vec<Face>, scene: &Scene, report: &mut Report) -> (Vec<Face>, usize) {
+pub fn without_duplicates(
+    faces: Vec<Face>,
+    places: &Places,
+    scene: &Scene,
+    report: &mut Report,
+) -> (Vec<Face>, usize) {
     let mut first: HashMap<Vec<u32>, usize> = HashMap::new();
     let mut kept = vec![true; faces.len()];
     for (index, face) in faces.iter().enumerate() {
@@ -30,6 +37,9 @@ pub fn without_duplicates(faces: Vec<Face>, scene: &Scene, report: &mut Report) 
         }
     }
     let dropped = kept.iter().filter(|kept| !**kept).count();
+    let area = |face: &Face| polygon::area(&places.corners(&face.corners));
+    let lost: f64 = faces.iter().zip(&kept).filter(|(_, kept)| !**kept).map(|(face, _)| area(face)).sum();
+    report.estimate("area of dropped duplicates", lost.abs());
     if dropped > 0 {
         report.warn(format!(
             "{}: {dropped} faces with the corners and orientation of another were dropped",

@@ -5,6 +5,9 @@ use geometry::plane::Plane;
 use geometry::polygon;
 use glam::{DVec2, DVec3};
 
+/// Steps of the coordinates in a unit of the frame, 2^40: a step is 1e-12.
+const STEPS: f64 = 1_099_511_627_776.0;
+
 /// A right-handed frame in a plane.
 #[derive(Debug, Clone, Copy)]
 pub struct Frame {
@@ -45,6 +48,12 @@ impl Frame {
     pub fn lift(&self, uv: DVec2) -> DVec3 {
         self.plane.origin + self.size * (uv.x * self.x + uv.y * self.y)
     }
+}
+
+/// Coordinates in steps far below the weld tolerance and far above rounding: a scene in another unit, whose coordinates
+/// differ in their last digits, has the same.
+pub fn stepped(uv: DVec2) -> DVec2 {
+    (uv * STEPS).round() / STEPS
 }
 
 /// Twice the signed area of a triangle, positive where it runs counter-clockwise.

@@ -11,6 +11,7 @@ use crate::planar::{Border, Contact, PlanarGraph, Point};
 use crate::sheets::Layer;
 use crate::steps::{Off, Step};
 use crate::triangulation::Trouble;
+use geometry::polygon;
 use glam::DVec2;
 
 /// Elements of a layer.
@@ -98,7 +99,13 @@ fn cut(
     let seam = |edge: u32| !graph.edges[edge as usize].contacts.is_empty();
     let own: Vec<u32> = layer.sheets[index as usize].ring.clone();
     let keep = |point: u32| graph.points[point as usize].place.is_some_and(|place| own.contains(&place));
-    let rings = convex_pieces(&graph, &triangulation, held, seam, keep);
+    let rings = convex_pieces(&layer.frame, &graph, &triangulation, held, seam, keep);
+    let lost =
+        (0..triangulation.triangles.len()).filter(|&t| triangulation.winding(t, index) > 0 && !held(t));
+    let area = |t: usize| {
+        polygon::area(&triangulation.triangles[t].corners.map(|p| graph.points[p as usize].position))
+    };
+    patch.overlapped += lost.map(area).sum::<f64>();
     let start = patch.points.len() as u32;
     patch.points.extend(&graph.points);
     let is_seam = |a: u32, b: u32| {

@@ -1,6 +1,6 @@
 //! `mesh-tool info`: what is in a mesh or a material table, on a page a person reads in ten seconds, or as JSON.
 
-use crate::build::{Quality, smallest_angle};
+use crate::quality::{Quality, smallest_angle};
 use crate::sheets;
 use geometry::polygon;
 use glam::DVec3;

@@ -9,7 +9,8 @@
 //! - [`sized`] finds the size: where light changes ([`light`], [`lit`]), where its interpolation asks for it ([`adaptive`]),
 //!   or where a solution is worst ([`solved`]); [`conform`] makes planes meet.
 //!
-//! [`assemble`] numbers elements ([`cluster`]) and nodes ([`nodes`]); [`info`] and [`picture`] show the result.
+//! [`assemble`] leaves out what has no area ([`flat`]), numbers elements ([`cluster`]) and nodes ([`nodes`]); [`quality`]
+//! measures them; [`info`] and [`picture`] show the result.
 //!
 //! # Limitations
 //! With a number of elements as budget, shape yields to it: faces much narrower than the elements get narrow ones. Two
@@ -32,6 +33,7 @@ pub mod discontinuity;
 pub mod duplicates;
 pub mod eee;
 pub mod features;
+pub mod flat;
 pub mod frame;
 pub mod given;
 pub mod hidden;
@@ -47,6 +49,7 @@ pub mod patch;
 pub mod picture;
 pub mod places;
 pub mod planar;
+pub mod quality;
 pub mod refine;
 pub mod regions;
 pub mod seeds;

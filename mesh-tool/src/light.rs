@@ -130,7 +130,8 @@ impl Light {
                 let ray = |k: u32| {
                     let sine2 = (f64::from(k) + 0.5) / f64::from(RAYS);
                     let (sine, cosine) = (sine2.sqrt(), (1.0 - sine2).sqrt());
-                    let around = GOLDEN_ANGLE * f64::from(k);
+                    // Half a step on, no ray runs along an axis, where it would graze the edges of aligned boxes.
+                    let around = GOLDEN_ANGLE * (f64::from(k) + 0.5);
                     seen(origin, sine * (around.cos() * x + around.sin() * y) + cosine * lit.normal)
                 };
                 REFLECTANCE * (0..RAYS).map(ray).sum::<f64>() / f64::from(RAYS)

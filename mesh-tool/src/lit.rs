@@ -27,6 +27,8 @@ const ROUNDS: usize = 30;
 const ENOUGH: f64 = 0.97;
 /// No edge is halved to less than this part of that of as many equal triangles.
 const SHORTEST: f64 = 1.0 / 64.0;
+/// Of a triangle to be made smaller all edges at least this part of the longest are halved: a strip stays one wide.
+pub const LONG: f64 = 0.6;
 /// Light below this part of the scene's mean counts like it.
 const DARK: f64 = 0.05;
 /// Power of the area: below 1, for what counts is also how deep light is smeared, not only over how much area.
@@ -118,7 +120,7 @@ pub fn refine(
                     return Ok(());
                 }
                 drawing
-                    .halve(mesh, marked, SHORTEST * spacing)
+                    .halve(mesh, marked, LONG, SHORTEST * spacing)
                     .map_err(|trouble| (layer, trouble))
                     .map(|_| ())
             },

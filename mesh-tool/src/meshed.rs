@@ -5,12 +5,13 @@ use crate::clean::Cleaned;
 use crate::conform::EdgeSplit;
 use crate::contact::{ContactLine, Pieces, contact_lines};
 use crate::discontinuity::{DrawnLine, Order};
+use crate::frame::stepped;
 use crate::given::drawn;
 use crate::hidden::{HIDDEN, HiddenParts, draw_contacts};
 use crate::patch::{Patch, PatchElement, PatchLine};
 use crate::planar::{Contact, PlanarGraph, Point};
 use crate::refine::{Refinement, Target};
-use crate::regions::winner;
+use crate::regions::{overlapped_area, winner};
 use crate::seeds::lattice;
 use crate::sheets::Layer;
 use crate::solids::Solids;
@@ -40,6 +41,12 @@ impl Triangles {
     /// Sheet that holds a triangle.
     pub fn sheet(&self, triangle: usize) -> Option<u32> {
         self.winners[triangle]
+    }
+
+    /// Points on edges of the graph, which no smoothing moves: number and position.
+    pub fn fixed_points(&self) -> impl Iterator<Item = (usize, DVec3)> + '_ {
+        let Refinement { graph, free, .. } = &self.refinement;
+        graph.points.iter().enumerate().filter(|(k, _)| !free[*k]).map(|(k, point)| (k, point.position))
     }
 
     /// Points on the edges of the graph that elements have.
@@ -81,6 +88,7 @@ pub struct Drawing {
     hidden: HiddenParts,
     contacts: usize,
     overlapping: usize,
+    overlapped: f64,
     crossing: usize,
     lost_emitters: Vec<(u32, u32)>,
     /// Area that the elements will cover, in square units of length.
@@ -146,7 +154,10 @@ impl Drawing {
         let rings = layer
             .sheets
             .iter()
-            .map(|sheet| sheet.ring.iter().map(|&p| layer.frame.flatten(scene.places.position(p))).collect())
+            .map(|sheet| {
+                let at = |&p: &u32| stepped(layer.frame.flatten(scene.places.position(p)));
+                sheet.ring.iter().map(at).collect()
+            })
             .collect();
         let (mut area, mut losers) = (0.0, std::collections::BTreeMap::new());
         for (t, triangle) in triangulation.triangles.iter().enumerate() {
@@ -168,12 +179,14 @@ impl Drawing {
         crossed.sort_unstable();
         crossed.dedup();
         let emits = |sheet: &u32| scene.faces[layer.sheets[*sheet as usize].face as usize].emits;
+        let overlapped = overlapped_area(&layer, &graph, &triangulation, |_| true);
         Ok(Drawing {
             graph,
             rings,
             hidden,
             contacts: within.len(),
             overlapping: losers.len(),
+            overlapped,
             crossing: crossed.len(),
             lost_emitters: losers.into_iter().filter(|(sheet, _)| emits(sheet)).collect(),
             area,
@@ -204,11 +217,18 @@ impl Drawing {
         Ok(self.owned(refinement, triangulation))
     }
 
-    /// Halves the edges of the triangles `marked` (by their number in `triangles`) that are at least twice as long
-    /// as `shortest`, in units of length. `false` where there are none.
-    pub fn halve(&self, triangles: &mut Triangles, marked: &[usize], shortest: f64) -> Result<bool, Trouble> {
+    /// Halves the edges of the triangles `marked` (by their number in `triangles`) that are at least the part `long` of
+    /// their longest and twice as long as `shortest`, in units of length. `false` where there are none.
+    pub fn halve(
+        &self,
+        triangles: &mut Triangles,
+        marked: &[usize],
+        long: f64,
+        shortest: f64,
+    ) -> Result<bool, Trouble> {
         let shortest = shortest / self.layer.frame.size;
-        let halved = triangles.refinement.halve_triangles(&triangles.triangulation, marked, shortest)?;
+        let halved =
+            triangles.refinement.halve_triangles(&triangles.triangulation, marked, long, shortest)?;
         let Some(triangulation) = halved else { return Ok(false) };
         let refinement = triangles.refinement.clone();
         *triangles = self.owned(refinement, triangulation);
@@ -238,15 +258,34 @@ impl Drawing {
         Ok(())
     }
 
-    /// Splits edges of the graph at given points; with `widen`, widens the small angles that this makes.
+    /// Moves points by no more than `tolerance`, in units of length, and joins those that get to one place.
+    pub fn move_points(
+        &self,
+        triangles: &mut Triangles,
+        moves: impl Iterator<Item = (usize, DVec3)>,
+        tolerance: f64,
+    ) -> Result<(), Trouble> {
+        let tolerance = tolerance / self.layer.frame.size;
+        let mut refinement = triangles.refinement.clone();
+        match refinement.move_points(moves, &self.layer.frame, tolerance)? {
+            Some(triangulation) => *triangles = self.owned(refinement, triangulation),
+            None => triangles.refinement = refinement,
+        }
+        Ok(())
+    }
+
+    /// Splits edges of the graph at given points; with `widen`, widens the small angles that this makes. What tangles is
+    /// joined within `tolerance`, in units of length.
     pub fn split_edges(
         &self,
         triangles: &mut Triangles,
         splits: &[EdgeSplit],
         widen: bool,
+        tolerance: f64,
     ) -> Result<(), Trouble> {
         let mut refinement = triangles.refinement.clone();
-        let triangulation = refinement.split_edges(splits, &self.layer.frame, widen)?;
+        let tolerance = tolerance / self.layer.frame.size;
+        let triangulation = refinement.split_edges(splits, &self.layer.frame, widen, tolerance)?;
         *triangles = self.owned(refinement, triangulation);
         Ok(())
     }
@@ -270,6 +309,7 @@ impl Drawing {
             points: graph.points.clone(),
             contacts: self.contacts,
             overlapping: self.overlapping,
+            overlapped: self.overlapped,
             crossing: self.crossing,
             lost_emitters: self.lost_emitters.clone(),
             ..Patch::default()

@@ -39,6 +39,8 @@ pub struct Patch {
     pub lines: Vec<PatchLine>,
     /// Area of each sheet that is hidden and has no elements: sheet and area.
     pub hidden: Vec<(u32, f64)>,
+    /// Area that sheets would have where another holds the place.
+    pub overlapped: f64,
     /// Emitters that lost part of their area to another face: sheet and the one that holds it.
     pub lost_emitters: Vec<(u32, u32)>,
     /// Sheets that lost part of their area to another.

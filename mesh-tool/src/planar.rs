@@ -5,7 +5,7 @@
 //! it (snap rounding in the sense of Hobby 1999, without the pixel grid). Leading an edge through a point moves it,
 //! so the search is repeated until nothing changes.
 
-use crate::frame::{Frame, nearest_on_segment, turn};
+use crate::frame::{Frame, nearest_on_segment, stepped, turn};
 use crate::places::Places;
 use crate::triangulation::{Triangulation, Trouble};
 use glam::{DVec2, DVec3};
@@ -75,9 +75,9 @@ impl PlanarGraph {
         self.point(Point { uv: frame.flatten(position), position, place: Some(place) })
     }
 
-    /// Adds a point.
+    /// Adds a point; its coordinates are [`stepped`].
     pub fn point(&mut self, point: Point) -> u32 {
-        self.points.push(point);
+        self.points.push(Point { uv: stepped(point.uv), ..point });
         (self.points.len() - 1) as u32
     }
 
@@ -119,11 +119,17 @@ impl PlanarGraph {
     }
 
     /// Splits an edge at points, which stand in order along it.
-    pub fn split_at(&mut self, edge: usize, points: &[Point]) {
+    fn split_at(&mut self, edge: usize, points: &[Point]) {
+        let stops: Vec<u32> = points.iter().map(|&point| self.point(point)).collect();
+        self.lead_through(edge, &stops);
+    }
+
+    /// Leads an edge through points of the graph, in this order. Edges may then lie on each other until
+    /// [`PlanarGraph::join_edges`].
+    pub fn lead_through(&mut self, edge: usize, stops: &[u32]) {
         let to = self.edges[edge].to;
         let mut at = edge;
-        for &point in points {
-            let middle = self.point(point);
+        for &middle in stops {
             self.edges[at].to = middle;
             let rest = Edge { from: middle, to, ..self.edges[at].clone() };
             self.edges.push(rest);
@@ -131,14 +137,24 @@ impl PlanarGraph {
         }
     }
 
+    /// Joins edges between the same points into one.
+    pub fn join_edges(&mut self) {
+        self.edges = merged(std::mem::take(&mut self.edges));
+    }
+
     /// Splits edges where they meet, merges points and edges that coincide within `tolerance` (in units of the
     /// frame), coarsening it where rounding leaves the graph tangled, and triangulates it.
     pub fn arrange(self, tolerance: f64) -> Result<(PlanarGraph, Triangulation), Trouble> {
+        self.arrange_renaming(tolerance).map(|(graph, triangulation, _)| (graph, triangulation))
+    }
+
+    /// The same; the last result is the new number of every point there was.
+    pub fn arrange_renaming(self, tolerance: f64) -> Result<(PlanarGraph, Triangulation, Vec<u32>), Trouble> {
         let attempt = |tolerance: f64| {
             let mut graph = self.clone();
-            graph.split(tolerance)?;
+            let renamed = graph.split(tolerance)?;
             let triangulation = graph.triangulate()?;
-            Ok((graph, triangulation))
+            Ok((graph, triangulation, renamed))
         };
         attempt(tolerance)
             .or_else(|_: Trouble| attempt(COARSER * tolerance))
@@ -150,14 +166,15 @@ impl PlanarGraph {
         Triangulation::new(self)
     }
 
-    fn split(&mut self, tolerance: f64) -> Result<(), Trouble> {
+    /// Returns the new number of every point there was.
+    fn split(&mut self, tolerance: f64) -> Result<Vec<u32>, Trouble> {
         let mut places = Places::new(DVec3::ZERO, tolerance);
-        self.merge_points(&mut places);
+        let renamed = self.merge_points(&mut places);
         for _ in 0..SPLIT_ROUNDS {
             let splits = self.find_splits(&mut places, tolerance);
             if splits.iter().all(Vec::is_empty) {
                 self.edges.retain(|edge| !edge.borders.is_empty() || !edge.contacts.is_empty());
-                return Ok(());
+                return Ok(renamed);
             }
             let mut parts = Vec::new();
             for (edge, mut splits) in self.edges.drain(..).zip(splits) {
@@ -174,8 +191,8 @@ impl PlanarGraph {
         Err(Trouble::Tangled)
     }
 
-    /// Replaces points by the first one within the tolerance.
-    fn merge_points(&mut self, places: &mut Places) {
+    /// Replaces points by the first one within the tolerance; returns the new number of every point there was.
+    fn merge_points(&mut self, places: &mut Places) -> Vec<u32> {
         let mut kept = Vec::new();
         let renamed: Vec<u32> = self
             .points
@@ -192,7 +209,8 @@ impl PlanarGraph {
         for edge in &mut self.edges {
             (edge.from, edge.to) = (renamed[edge.from as usize], renamed[edge.to as usize]);
         }
-        self.edges = merged(std::mem::take(&mut self.edges));
+        self.join_edges();
+        renamed
     }
 
     /// For each edge the points that lie on it or where it crosses another, with their place along it.
@@ -240,9 +258,9 @@ impl PlanarGraph {
                 && let Some((along_i, along_j)) = self.crossing(i, j)
             {
                 let crossing = self.along(i, along_i);
-                let point = places.insert(crossing.uv.extend(0.0));
+                let point = places.insert(stepped(crossing.uv).extend(0.0));
                 if point as usize == self.points.len() {
-                    self.points.push(crossing);
+                    self.point(crossing);
                 }
                 splits[i].push((along_i, point));
                 splits[j].push((along_j, point));

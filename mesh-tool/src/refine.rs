@@ -6,20 +6,19 @@
 //! and points are added in batches between which the free points are smoothed, which gives rounder triangles for
 //! the same count.
 
-use crate::conform::EdgeSplit;
-use crate::frame::{Frame, turn};
-use crate::planar::{Contact, PlanarGraph, Point};
-use crate::triangulation::{Triangle, Triangulation, Trouble, grid_place};
+use crate::frame::turn;
+use crate::planar::{PlanarGraph, Point};
+use crate::triangulation::{Triangle, Triangulation, Trouble};
 use glam::{DVec2, DVec3};
-use std::collections::{BTreeSet, HashSet};
+use std::collections::BTreeSet;
+
+mod edits;
 
 /// Triangles with a smaller angle are refined, in degrees. Ruppert's bound for termination is 20.7; the floor on the
 /// edge length ends the rest.
 const SMALLEST_ANGLE: f64 = 25.0;
 /// The longest edges of neighbours differ by no more than this factor, above the floor.
 const GRADING: f64 = 2.0;
-/// Of a triangle to be made smaller all edges at least this part of the longest are halved: a strip stays one wide.
-const LONG: f64 = 0.6;
 /// Rounds of adding points; each settles most of what the one before left.
 const ROUNDS: usize = 12;
 /// Rounds of smoothing before and after.
@@ -90,12 +89,14 @@ impl Refinement {
         self.shorten(triangulation)
     }
 
-    /// Halves the long edges of the `marked` triangles, in units of the frame down to `shortest`, and widens the small
-    /// angles that this leaves around them. `None` where nothing can be halved.
+    /// Halves the edges of the `marked` triangles that are at least the part `long` of their longest, in units of the
+    /// frame down to `shortest`, and widens the small angles that this leaves around them. `None` where nothing can be
+    /// halved.
     pub fn halve_triangles(
         &mut self,
         triangulation: &Triangulation,
         marked: &[usize],
+        long: f64,
         shortest: f64,
     ) -> Result<Option<Triangulation>, Trouble> {
         let (mut seen, mut changes) = (BTreeSet::new(), Vec::new());
@@ -105,7 +106,7 @@ impl Refinement {
             for k in 0..3 {
                 let (a, b) = (triangle.corners[k], triangle.corners[(k + 1) % 3]);
                 let length = self.uv(a).distance(self.uv(b));
-                if length >= (LONG * longest).max(2.0 * shortest) && seen.insert((a.min(b), a.max(b))) {
+                if length >= (long * longest).max(2.0 * shortest) && seen.insert((a.min(b), a.max(b))) {
                     changes.push((self.middle(triangle, k), 0.5 * length));
                 }
             }
@@ -116,54 +117,6 @@ impl Refinement {
         let first_new = self.graph.points.len();
         self.apply(&changes);
         self.widen(first_new).map(Some)
-    }
-
-    /// Splits edges at points, which stand in order along them; with `widen`, widens the small angles this makes.
-    pub fn split_edges(
-        &mut self,
-        splits: &[EdgeSplit],
-        frame: &Frame,
-        widen: bool,
-    ) -> Result<Triangulation, Trouble> {
-        let first_new = self.graph.points.len();
-        // Two edges closer together than the triangulation can tell must not get a point at the same place.
-        let mut taken: HashSet<[u64; 2]> =
-            self.graph.points.iter().map(|point| grid_place(point.uv)).collect();
-        for (edge, points) in splits {
-            let ends = [self.graph.edges[*edge].from, self.graph.edges[*edge].to];
-            let size = ends.iter().map(|&p| self.sizes[p as usize]).fold(0.0, f64::max);
-            let points: Vec<Point> = points
-                .iter()
-                .map(|&(_, position)| Point { uv: frame.flatten(position), position, place: None })
-                .filter(|point| taken.insert(grid_place(point.uv)))
-                .collect();
-            self.free.extend(points.iter().map(|_| false));
-            self.sizes.extend(points.iter().map(|_| size));
-            self.graph.split_at(*edge, &points);
-        }
-        if widen { self.widen(first_new) } else { self.graph.triangulate() }
-    }
-
-    /// Adds a line that may cross others; to be followed by [`Refinement::rearrange`].
-    pub fn add_line(&mut self, ends: [DVec3; 2], contact: Contact, frame: &Frame) {
-        let [from, to] = ends
-            .map(|position| self.graph.point(Point { uv: frame.flatten(position), position, place: None }));
-        self.graph.contact(from, to, contact);
-    }
-
-    /// Splits edges where they cross after lines were added; points keep their numbers.
-    pub fn rearrange(&mut self, tolerance: f64) -> Result<Triangulation, Trouble> {
-        let before = self.free.len();
-        self.graph = self.graph.clone().arrange(tolerance)?.0;
-        self.free.resize(self.graph.points.len(), false);
-        let spacing = self.target.spacing;
-        self.sizes.resize(self.graph.points.len(), spacing);
-        for edge in &self.graph.edges {
-            for point in [edge.from, edge.to] {
-                self.free[point as usize] = false;
-            }
-        }
-        self.widen(before)
     }
 
     /// Widens small angles, moving only points from number `first_new` on.

@@ -1,12 +1,13 @@
 //! Planar regions: coplanar neighbours of one material and group become one face, with holes where others hold the
 //! place. What is meshed, casts shadows and receives lines then no longer depends on how a wall was cut into faces.
 
-use crate::clean::{Cleaned, Face, Member};
+use crate::clean::{Cleaned, Face, Member, without_repeats};
 use crate::given::drawn;
 use crate::outline::{regions, ring};
 use crate::planar::PlanarGraph;
 use crate::sheets::Layer;
-use crate::triangulation::{Triangulation, Trouble};
+use crate::triangulation::{RESOLUTION, Triangulation, Trouble};
+use geometry::plane::Plane;
 use geometry::polygon;
 use interchange::ids::GroupId;
 use interchange::report::Report;
@@ -14,6 +15,12 @@ use std::collections::BTreeMap;
 
 /// A ring turns by less than this at corners that are left out, in radians; far below what a shadow can tell.
 const STRAIGHT: f64 = 1e-10;
+/// So are corners closer than this, in units of the frame, to the line between those beside them: no triangle between
+/// the three could be told from one that is turned over.
+const FLAT: f64 = RESOLUTION;
+
+/// Corners of a region lie within so many weld tolerances of its plane: those of coplanar faces do, but for the weld.
+const FLATNESS: f64 = 2.0;
 
 /// An emitter that lost part of its place to another face.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,20 +34,21 @@ pub struct LostEmitter {
 }
 
 /// Merges the faces of a scene; one-sided ones only, for both sides of a two-sided face must stay one face. Also
-/// returns the emitters that lost their place to another.
-pub fn merged(scene: Cleaned, layers: &[Layer], report: &mut Report) -> (Cleaned, Vec<LostEmitter>) {
-    let mut lost = Vec::new();
+/// returns the emitters that lost their place to another, and the area that any faces lost so.
+pub fn merged(scene: Cleaned, layers: &[Layer], report: &mut Report) -> (Cleaned, Vec<LostEmitter>, f64) {
+    let (mut lost, mut overlapped) = (Vec::new(), 0.0);
     let mut overlapping = 0;
     let before = scene.faces.len();
     let mut replaced = vec![false; before];
     let mut made: Vec<Face> = Vec::new();
     let mut scene = scene;
     for layer in layers.iter().filter(|layer| layer.sheets.len() > 1) {
-        // Faces too close to be told apart stay faces.
-        let Ok((found, losers)) = regions_of(layer, &mut scene) else {
+        // Faces too close to be told apart stay faces, and so do slivers whose union is thinner than it is flat.
+        let Ok((found, losers, area)) = regions_of(layer, &mut scene) else {
             report.count("planes not merged", 1);
             continue;
         };
+        overlapped += area;
         let face_of = |sheet: u32| &scene.faces[layer.sheets[sheet as usize].face as usize];
         for (&loser, &winner) in &losers {
             let (face, holder) = (face_of(loser), face_of(winner));
@@ -83,7 +91,7 @@ pub fn merged(scene: Cleaned, layers: &[Layer], report: &mut Report) -> (Cleaned
     faces.sort_by_key(|face| (face.input, face.line, face.corners.first().copied()));
     report.count("faces merged into regions", before.saturating_sub(faces.len()));
     report.count("overlapping faces cut", overlapping);
-    (Cleaned { faces, ..scene }, lost)
+    (Cleaned { faces, ..scene }, lost, overlapped)
 }
 
 /// A region before it is a face.
@@ -94,6 +102,13 @@ struct Region {
 }
 
 impl Region {
+    /// Whether the plane that the ring itself spans is that of its corners.
+    fn is_flat(&self, scene: &Cleaned) -> bool {
+        let (corners, tolerance) = (scene.places.corners(&self.corners), scene.places.tolerance());
+        let near = |plane: Plane| corners.iter().all(|&p| plane.distance(p).abs() <= FLATNESS * tolerance);
+        Plane::of_polygon(&corners).is_none_or(near)
+    }
+
     fn face(&self, layer: &Layer, scene: &Cleaned) -> Face {
         let face_of = |&sheet: &u32| &scene.faces[layer.sheets[sheet as usize].face as usize];
         let area = |face: &Face| polygon::area(&scene.places.corners(&face.corners));
@@ -123,8 +138,8 @@ impl Region {
 /// Sheets that lost part of their place, and one that holds it.
 type Losers = BTreeMap<u32, u32>;
 
-/// The regions of one layer that one-sided faces hold.
-fn regions_of(layer: &Layer, scene: &mut Cleaned) -> Result<(Vec<Region>, Losers), Trouble> {
+/// The regions of one layer that one-sided faces hold, and the area that one-sided faces lose to others.
+fn regions_of(layer: &Layer, scene: &mut Cleaned) -> Result<(Vec<Region>, Losers, f64), Trouble> {
     let graph = drawn(layer, 0..layer.sheets.len() as u32, scene, |_| {});
     let (graph, triangulation) = graph.arrange(scene.places.tolerance() / layer.frame.size)?;
     let winner = |t: usize| winner(layer, &triangulation, t);
@@ -133,7 +148,7 @@ fn regions_of(layer: &Layer, scene: &mut Cleaned) -> Result<(Vec<Region>, Losers
         (!face.two_sided).then_some((face.material, face.group))
     };
     let found = regions(&triangulation, class);
-    let regions = found
+    let regions: Vec<Region> = found
         .iter()
         .map(|triangles| {
             let mut sheets: Vec<u32> = triangles.iter().filter_map(|&t| winner(t)).collect();
@@ -145,6 +160,9 @@ fn regions_of(layer: &Layer, scene: &mut Cleaned) -> Result<(Vec<Region>, Losers
             Region { corners, sheets, area }
         })
         .collect();
+    if regions.iter().any(|region| !region.is_flat(scene)) {
+        return Err(Trouble::Crowded);
+    }
     let mut losers = Losers::new();
     for t in 0..triangulation.triangles.len() {
         let Some(winner) = winner(t) else { continue };
@@ -152,7 +170,9 @@ fn regions_of(layer: &Layer, scene: &mut Cleaned) -> Result<(Vec<Region>, Losers
             losers.entry(sheet).or_insert(winner);
         }
     }
-    Ok((regions, losers))
+    let two_sided = |sheet: u32| scene.faces[layer.sheets[sheet as usize].face as usize].two_sided;
+    let overlapped = overlapped_area(layer, &graph, &triangulation, |sheet| !two_sided(sheet));
+    Ok((regions, losers, overlapped))
 }
 
 /// The sheet that holds a triangle.
@@ -161,14 +181,33 @@ pub fn winner(layer: &Layer, triangulation: &Triangulation, triangle: usize) -> 
     layer.winner(triangulation.sheets(triangle).filter(own).map(|(sheet, _)| sheet))
 }
 
+/// Area that the sheets for which `counts` holds would have where another holds the place.
+pub fn overlapped_area(
+    layer: &Layer,
+    graph: &PlanarGraph,
+    triangulation: &Triangulation,
+    counts: impl Fn(u32) -> bool,
+) -> f64 {
+    let lost = |t: usize| {
+        let holder = winner(layer, triangulation, t)?;
+        let own = triangulation.sheets(t).filter(|&(sheet, _)| (sheet as usize) < layer.sheets.len());
+        let times: i32 = own
+            .filter(|&(sheet, winding)| winding > 0 && counts(sheet))
+            .map(|(sheet, winding)| winding - i32::from(sheet == holder))
+            .sum();
+        let corners = triangulation.triangles[t].corners.map(|p| graph.points[p as usize].position);
+        (times > 0).then(|| f64::from(times) * polygon::area(&corners))
+    };
+    (0..triangulation.triangles.len()).filter_map(lost).sum::<f64>().abs()
+}
+
 /// Places of points; where borders cross each other, new ones.
 fn placed(graph: &PlanarGraph, ring: &[u32], scene: &mut Cleaned) -> Vec<u32> {
-    ring.iter()
-        .map(|&p| {
-            let point = &graph.points[p as usize];
-            point.place.unwrap_or_else(|| scene.places.insert(point.position))
-        })
-        .collect()
+    let place = |&p: &u32| {
+        let point = &graph.points[p as usize];
+        point.place.unwrap_or_else(|| scene.places.insert(point.position))
+    };
+    without_repeats(ring.iter().map(place).collect())
 }
 
 fn without_straight(graph: &PlanarGraph, mut ring: Vec<u32>) -> Vec<u32> {
@@ -178,7 +217,8 @@ fn without_straight(graph: &PlanarGraph, mut ring: Vec<u32>) -> Vec<u32> {
         let [a, b, c] =
             [ring[(k + n - 1) % n], ring[k], ring[(k + 1) % n]].map(|p| graph.points[p as usize].uv);
         let (before, after) = (b - a, c - b);
-        let straight = before.perp_dot(after).abs() <= STRAIGHT * before.length() * after.length();
+        let limit = (STRAIGHT * before.length() * after.length()).max(FLAT * a.distance(c));
+        let straight = before.perp_dot(after).abs() <= limit;
         if straight && before.dot(after) > 0.0 {
             ring.remove(k);
         } else {

@@ -58,13 +58,8 @@ pub fn layers(scene: &Cleaned, together: bool) -> Vec<Layer> {
         (0..faces.len()).map(|face| vec![face]).collect()
     };
     for plane in planes {
-        // The largest face fixes the plane best; the first of (nearly) equal ones, so that rounding does not choose.
-        let mut largest = plane[0];
-        for &face in &plane {
-            if polygon::area(&corners[face]) > 1.000001 * polygon::area(&corners[largest]) {
-                largest = face;
-            }
-        }
+        // The largest face fixes the plane best.
+        let Some(largest) = largest(&plane, &corners) else { continue };
         let frame = Frame::new(&faces[largest].plane, plane.iter().map(|&face| corners[face].as_slice()));
         for reversed in [false, true] {
             let sheets: Vec<Sheet> =
@@ -94,7 +89,8 @@ fn sheets_of(index: usize, face: &Face, frame: &Frame, reversed: bool) -> impl I
     })
 }
 
-/// Faces grouped by plane: two that are coplanar and whose boxes touch belong together, and so do chains of them.
+/// Faces grouped by plane: two that are coplanar and whose boxes touch belong together, and so do chains of them as far
+/// as they lie in the plane of the largest.
 fn coplanar_groups(faces: &[Face], corners: &[Vec<DVec3>], tolerance: f64) -> Vec<Vec<usize>> {
     let margin = DVec3::splat(tolerance);
     let boxes: Vec<(DVec3, DVec3)> = corners.iter().map(|corners| bounds(corners)).collect();
@@ -120,8 +116,33 @@ fn coplanar_groups(faces: &[Face], corners: &[Vec<DVec3>], tolerance: f64) -> Ve
         let root = root(&mut group, face);
         groups[root].push(face);
     }
-    groups.retain(|group| !group.is_empty());
-    groups
+    // A sliver may lie in the planes of two faces that do not lie in each other's: what is in the plane of the largest
+    // face stays together, the rest forms groups of its own.
+    let mut flat: Vec<Vec<usize>> = Vec::new();
+    for mut group in groups.into_iter().filter(|group| !group.is_empty()) {
+        while let Some(reference) = largest(&group, corners) {
+            let lies = |&face: &usize| {
+                face == reference
+                    || coplanar(&faces[face], &corners[face], &faces[reference], &corners[reference])
+            };
+            let (within, rest): (Vec<usize>, Vec<usize>) = group.into_iter().partition(lies);
+            flat.push(within);
+            group = rest;
+        }
+    }
+    flat.sort_by_key(|group| group[0]);
+    flat
+}
+
+/// The largest face of a group; the first of (nearly) equal ones, so that rounding does not choose.
+fn largest(group: &[usize], corners: &[Vec<DVec3>]) -> Option<usize> {
+    let mut largest = *group.first()?;
+    for &face in group {
+        if polygon::area(&corners[face]) > 1.000001 * polygon::area(&corners[largest]) {
+            largest = face;
+        }
+    }
+    Some(largest)
 }
 
 /// Whether the smaller face lies in the plane of the larger one, looking either way.

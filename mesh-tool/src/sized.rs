@@ -6,6 +6,7 @@ use crate::conform;
 use crate::light::Light;
 use crate::lit;
 use crate::meshed::{Drawing, Triangles};
+use crate::places::Places;
 use crate::steps::Step;
 use crate::triangulation::Trouble;
 use interchange::report::Report;
@@ -43,14 +44,14 @@ pub fn sized(
     drawings: &[Drawing],
     light: Option<&Light>,
     options: &Options,
-    tolerance: f64,
+    places: &Places,
     report: &mut Report,
     name: &(impl Fn(u32, Trouble) -> Error + Sync),
 ) -> Result<Vec<Triangles>> {
     let max_edge = options.max_edge.unwrap_or(f64::INFINITY);
     // A number of elements is a budget: shape yields to it. A length alone is none.
     let floor = if options.elements.is_some() { FLOOR } else { FINE_FLOOR };
-    let meets = options.no_clean.leaves(Step::Meet).then_some(tolerance);
+    let meets = options.no_clean.leaves(Step::Meet).then_some(places);
     let search = Search { scene, drawings, max_edge, floor, meets, name };
     if let (Some(light), Some(asked)) = (light, options.tolerance) {
         let most = options.elements.map_or(MOST_ELEMENTS, f64::from);
@@ -101,8 +102,8 @@ struct Search<'a, Name> {
     drawings: &'a [Drawing],
     max_edge: f64,
     floor: f64,
-    /// Points of different planes closer than this are one, where planes are to meet.
-    meets: Option<f64>,
+    /// The scene's corners, where planes are to meet.
+    meets: Option<&'a Places>,
     name: &'a Name,
 }
 
@@ -133,7 +134,7 @@ impl<Name: Fn(u32, Trouble) -> Error + Sync> Search<'_, Name> {
 
     /// Makes planes meet; returns how many could not.
     fn meet(&self, meshes: &mut [Triangles]) -> usize {
-        self.meets.map_or(0, |tolerance| conform::meet(self.drawings, meshes, tolerance))
+        self.meets.map_or(0, |places| conform::meet(self.drawings, meshes, places))
     }
 
     fn diagonal(&self) -> f64 {

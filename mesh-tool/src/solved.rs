@@ -1,6 +1,7 @@
 //! Refinement by a solution's own error: irradiance gathered at test points against what the solution says of the
 //! element. Where they differ by more than the tolerance, the element is divided; all others stay as they are.
 
+use crate::lit::LONG;
 use crate::meshed::{Drawing, Triangles};
 use crate::places::Places;
 use crate::triangulation::Trouble;
@@ -148,7 +149,9 @@ impl Solved {
         meshes.par_iter_mut().zip(drawings).zip(&marked).enumerate().try_for_each(
             |(layer, ((mesh, drawing), marked))| match marked.is_empty() {
                 true => Ok(()),
-                false => drawing.halve(mesh, marked, 0.0).map(|_| ()).map_err(|trouble| (layer, trouble)),
+                false => {
+                    drawing.halve(mesh, marked, LONG, 0.0).map(|_| ()).map_err(|trouble| (layer, trouble))
+                }
             },
         )
     }

@@ -14,6 +14,9 @@ use std::collections::HashMap;
 /// Coordinates of order one are rounded to this grid before spade sees them: then a scene in another unit, whose
 /// coordinates differ in the last digits, has the same triangles. It is 60 times finer than the weld tolerance.
 const GRID: f64 = 68_719_476_736.0; // 2^36
+/// Points at least this far apart, in units of the frame, and as far from each other's edges keep their sides when they
+/// are rounded to the grid: four of its steps.
+pub const RESOLUTION: f64 = 4.0 / GRID;
 /// A shear that lets the four corners of a square prefer one diagonal; far above the rounding to the grid.
 const SHEAR: f64 = 1.0 / 65_536.0;
 

@@ -1,30 +1,20 @@
-//! Soups: boxes and slivers that cross, touch, contain and nearly coincide with each other, at any scale. Whatever they
-//! are, there is no failure, no area is lost or counted twice, elements meet, and each lies in its face.
+//! Random soups: whatever boxes and slivers do to each other, at any scale, there is no failure, no area is lost or counted
+//! twice, elements meet, and each lies in its face.
 //!
-//! `cargo test -p mesh-tool --test soups --release -- --ignored` runs ten thousand of them.
+//! `cargo test -p mesh-tool --test soups --release -- --ignored --nocapture` makes ten thousand of them, a thousand of
+//! each of ten seeds.
 #![allow(clippy::unwrap_used)]
 
 mod common;
-use common::*;
-use glam::DVec3;
-use interchange::scene::Scene;
+use common::soup::{RELATIONS, Relation, Soup, Thing};
 use proptest::prelude::*;
-
-/// One thing in the soup: a box or a sliver, and how it stands to the one before.
-#[derive(Debug, Clone)]
-struct Thing {
-    low: [f64; 3],
-    size: [f64; 3],
-    relation: u8,
-    bottom: bool,
-    lamp: bool,
-    tilt: f64,
-}
+use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 
 fn any_thing() -> impl Strategy<Value = Thing> {
     let place = || prop::array::uniform3(-1.0..1.0f64);
     let extent = || prop_oneof![4 => 0.1..1.2f64, 1 => 1e-6..1e-3f64];
-    (place(), prop::array::uniform3(extent()), 0..7u8, any::<bool>(), 0..8u8, -1.0..1.0f64).prop_map(
+    let relation = prop::sample::select(RELATIONS.to_vec());
+    (place(), prop::array::uniform3(extent()), relation, any::<bool>(), 0..8u8, -1.0..1.0f64).prop_map(
         |(low, size, relation, bottom, lamp, tilt)| Thing {
             low,
             size,
@@ -36,93 +26,136 @@ fn any_thing() -> impl Strategy<Value = Thing> {
     )
 }
 
-/// Puts things into one scene above, on and through a floor.
-fn soup(things: &[Thing], turn: f64, power: i32) -> Scene {
-    let mut text = floor_text(-2.0, 3.0);
-    let mut before = ([0.0; 3], [0.5; 3]);
-    let mut vertices = 4;
-    for thing in things {
-        let (mut low, mut size) = (thing.low, thing.size);
-        match thing.relation {
-            // On the floor; on top of, inside, beside, and a hair off the one before.
-            0 => low[1] = 0.0,
-            1 => low = [before.0[0] + 0.1 * size[0], before.0[1] + before.1[1], before.0[2]],
-            2 => {
-                low = [0, 1, 2].map(|k| before.0[k] + 0.25 * before.1[k]);
-                size = before.1.map(|x| 0.5 * x);
-            }
-            3 => low = [before.0[0] + before.1[0], before.0[1], before.0[2]],
-            4 => (low, size) = (before.0.map(|x| x + 1e-11 * thing.tilt), before.1),
-            _ => {}
-        }
-        let high = [0, 1, 2].map(|k| low[k] + size[k]);
-        text += if thing.lamp { "usemtl lamp\n" } else { "usemtl white\n" };
-        if thing.relation == 5 {
-            // A sliver, nearly in the plane of the floor.
-            let h = 1e-7 * thing.tilt;
-            text += &format!(
-                "v {:?} 0 {:?}\nv {:?} {h:?} {:?}\nv {:?} 0 {:?}\nf -3 -2 -1\n",
-                low[0],
-                low[2],
-                high[0],
-                low[2] + 1e-4,
-                low[0] + 0.3,
-                high[2]
-            );
-            vertices += 3;
-        } else {
-            text += &box_text(low, high, thing.bottom, vertices + 1);
-            vertices += 8;
-        }
-        before = (low, size);
-    }
-    let mut scene = scene_of(&text);
-    let rotation = glam::DQuat::from_axis_angle(DVec3::new(0.3, 1.0, -0.2).normalize(), turn);
-    for vertex in &mut scene.vertices {
-        *vertex = (10f64.powi(power) * (rotation * DVec3::from_array(*vertex))).to_array();
-    }
-    scene
+fn any_soup() -> impl Strategy<Value = Soup> {
+    let turn = prop_oneof![Just(0.0), 0.0..6.0f64];
+    (prop::collection::vec(any_thing(), 1..6), turn, -6..=6i32).prop_map(|(things, turn, power)| Soup {
+        things,
+        turn,
+        power,
+    })
 }
 
-fn assert_survives(things: &[Thing], turn: f64, power: i32) {
-    let scene = soup(things, turn, power);
-    for options in [given(), elements(150)] {
-        // Convexity, planarity and "every element inside its face" are checked there.
-        let (_, report) = made(&scene, options);
-        // Faces too close to be told apart stay as they are, and overlap.
-        let tangled = ["planes not merged", "overlapping faces cut"];
-        if tangled.iter().all(|name| report.counters.get(*name).copied().unwrap_or(0) == 0) {
-            let shown = report.estimates["area of elements"];
-            let hidden = report.estimates["hidden area"];
-            let faces = report.estimates["area of faces"];
-            assert!(((shown + hidden) / faces - 1.0).abs() < 1e-9, "{shown} + {hidden} of {faces}");
-        }
+/// The first fault that a thousand soups of a seed (or as many as `cases`) show, shrunk.
+fn tried(seed: u8, cases: u32) -> Result<(), String> {
+    let config = ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() };
+    let random = TestRng::from_seed(RngAlgorithm::ChaCha, &[seed; 32]);
+    let outcome = TestRunner::new_with_rng(config, random).run(&any_soup(), |soup| {
+        let faults = soup.faults();
+        prop_assert!(faults.is_empty(), "{faults:#?}");
+        Ok(())
+    });
+    outcome.map_err(|fault| format!("seed {seed}: {fault}"))
+}
+
+#[test]
+fn soups_survive() {
+    assert_eq!(tried(0, 60), Ok(()));
+}
+
+#[test]
+#[ignore = "ten thousand scenes take minutes"]
+fn ten_thousand_soups_survive() {
+    // The panics of checks that shrinking repeats would bury the report.
+    std::panic::set_hook(Box::new(|_| {}));
+    let mut failed = 0;
+    for seed in 1..=10 {
+        let outcome = tried(seed, 1000);
+        println!("seed {seed}: {outcome:?}");
+        failed += usize::from(outcome.is_err());
+    }
+    let _ = std::panic::take_hook();
+    assert_eq!(failed, 0, "seeds with faults");
+}
+
+/// The corpus of the fuzz target `arrangement`, on a stable compiler.
+#[test]
+fn soups_of_the_fuzz_corpus_survive() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus/arrangement");
+    let mut paths: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    paths.sort();
+    assert!(paths.len() >= 12, "{paths:?}");
+    for path in paths {
+        let soup = Soup::from_bytes(&std::fs::read(&path).unwrap());
+        let faults = soup.faults();
+        assert!(faults.is_empty(), "{}: {soup:?}: {faults:#?}", path.display());
     }
 }
 
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 60, failure_persistence: None, ..ProptestConfig::default() })]
-
-    #[test]
-    fn soups_survive(
-        things in prop::collection::vec(any_thing(), 1..6),
-        turn in prop_oneof![Just(0.0), 0.0..6.0f64],
-        power in -6..=6i32,
-    ) {
-        assert_survives(&things, turn, power);
-    }
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 10_000, failure_persistence: None, ..ProptestConfig::default() })]
-
-    #[test]
-    #[ignore = "ten thousand scenes take minutes"]
-    fn ten_thousand_soups_survive(
-        things in prop::collection::vec(any_thing(), 1..6),
-        turn in prop_oneof![Just(0.0), 0.0..6.0f64],
-        power in -6..=6i32,
-    ) {
-        assert_survives(&things, turn, power);
+/// Soups that once failed, shrunk, with what failed.
+#[test]
+fn soups_that_failed_survive() {
+    let thing = |low: [f64; 3], size: [f64; 3], relation: Relation, tilt: f64| Thing {
+        low,
+        size,
+        relation,
+        bottom: false,
+        lamp: false,
+        tilt,
+    };
+    let (origin, cube) = ([0.0; 3], [0.1; 3]);
+    let soups: [(&str, Vec<Thing>, f64); 5] = [
+        (
+            "a sliver lies in the planes of two walls that are not coplanar",
+            vec![
+                thing(origin, cube, Relation::Again, 0.0),
+                thing(origin, cube, Relation::NearlyParallel, 0.3541061813062392),
+                thing(origin, [0.1, 1e-6, 1e-6], Relation::Beside, 0.0),
+            ],
+            0.0,
+        ),
+        (
+            "two edges within the tolerance of each other want the same point",
+            vec![
+                thing(origin, cube, Relation::Again, 0.0),
+                thing(
+                    [0.3197804762069433, 0.0, -0.436685818902924],
+                    [0.5164361474479929, 0.1, 1.0295525118082773],
+                    Relation::Sliver,
+                    0.9903873493785659,
+                ),
+            ],
+            3.9664026995071686,
+        ),
+        (
+            "a triangle without area is left out",
+            vec![
+                thing(origin, cube, Relation::NearlyParallel, -0.3976731647648),
+                thing(origin, cube, Relation::Again, -0.38575020161878437),
+                thing(origin, cube, Relation::NearlyParallel, 0.7463360013173072),
+            ],
+            1.6418490384337356,
+        ),
+        (
+            "two places a hair further apart than the tolerance lie on one edge",
+            vec![
+                thing(origin, cube, Relation::NearlyParallel, -0.1671631314757491),
+                thing(origin, cube, Relation::NearlyParallel, -0.24686785115750787),
+            ],
+            4.976627027126132,
+        ),
+        (
+            "the union of two slivers is thinner than it is flat",
+            vec![
+                thing(
+                    [0.46278213479555214, 0.0, 0.9662923137454198],
+                    [1.0690497764775746, 0.1, 0.0008318530277179792],
+                    Relation::Sliver,
+                    0.0,
+                ),
+                thing(
+                    [0.7974735588038837, 0.0, 0.5079492992594193],
+                    [0.0007912327954426657, 0.1, 0.4634294502901952],
+                    Relation::Sliver,
+                    -0.0479927386871456,
+                ),
+            ],
+            0.0,
+        ),
+    ];
+    for (cause, things, turn) in soups {
+        for power in [-6, 0, 6] {
+            let faults = Soup { things: things.clone(), turn, power }.faults();
+            assert!(faults.is_empty(), "{cause}: {faults:#?}");
+        }
     }
 }

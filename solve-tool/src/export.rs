@@ -64,7 +64,7 @@ struct Rows {
 /// Writes the table.
 ///
 /// Means run over all elements under a key, both sides of two-sided faces included: `area` is then twice the face's.
-/// Hidden parts count with radiosity and irradiance 0. Keys of faces that were dropped have area 0 and zeros.
+/// Hidden parts count with radiosity and irradiance 0; temperature and emissivity are those of what is seen. Keys of faces that were dropped have area 0 and zeros.
 pub fn run(request: &ExportRequest) -> interchange::Result<()> {
     let allowed = match request.quantity {
         Quantity::Links => &[TableFormat::Csv][..],
@@ -147,6 +147,13 @@ impl Table<'_> {
         sums.iter().zip(total).map(|(sum, area)| if area > 0.0 { sum / area } else { 0.0 }).collect()
     }
 
+    /// Area-weighted means over what has elements: of properties of a surface, which its hidden parts share.
+    fn means_seen(&self, value: impl Fn(usize) -> f64) -> Vec<f64> {
+        let seen = self.grouping.sums(|i| self.areas[i]);
+        let sums = self.grouping.sums(|i| self.areas[i] * value(i));
+        sums.iter().zip(seen).map(|(sum, area)| if area > 0.0 { sum / area } else { 0.0 }).collect()
+    }
+
     /// Luminance-weighted sum of the channels times the efficacy.
     fn luminous(&self, channels: [f64; 3]) -> f64 {
         let weighted: f64 = channels.iter().zip(LUMINANCE).map(|(x, weight)| weight * x).sum();
@@ -219,9 +226,9 @@ impl Table<'_> {
         let names = ["emissivity", "temperature", "net_flux", "net_heat"].map(str::to_owned).to_vec();
         let net = |i: usize| self.solution.radiosity[i][0] - self.solution.irradiance[i][0];
         // The temperature of the mean emissive power.
-        let temperature = self.means(|i| thermal[i][0].powi(4)).iter().map(|t| t.powf(0.25)).collect();
+        let temperature = self.means_seen(|i| thermal[i][0].powi(4)).iter().map(|t| t.powf(0.25)).collect();
         let heat = self.grouping.sums(|i| self.areas[i] * net(i));
-        Ok((names, vec![self.means(|i| thermal[i][1]), temperature, self.means(net), heat]))
+        Ok((names, vec![self.means_seen(|i| thermal[i][1]), temperature, self.means(net), heat]))
     }
 
     /// Links between keys: those between elements, added up.

@@ -12,6 +12,8 @@ use mesh_tool::{Options, build};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+pub mod soup;
+
 pub fn scene_path(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/scenes").join(name)
 }
@@ -98,12 +100,17 @@ pub fn check(mesh: &Mesh) {
         let normal = polygon::vector_area(&mesh.face_corners(FaceId::new(face)));
         assert!(polygon::is_convex(&corners, normal.normalize(), 1e-8), "piece {piece} is not convex");
         assert!(polygon::vector_area(&corners).dot(normal) > 0.0);
-        piece_area[face] += polygon::area(&corners);
+        // Seen along the normal: a strip of a face that is planar to its tolerance may lie at an angle.
+        piece_area[face] += polygon::vector_area(&corners).dot(normal.normalize());
         pieces_of[face].push(corners);
     }
     for face in (0..mesh.face_count()).map(FaceId::new) {
-        let area = polygon::area(&mesh.face_corners(face));
-        assert!((piece_area[face.index()] - area).abs() <= 1e-12 * area, "pieces of {face:?}");
+        let (area, size) =
+            (polygon::area(&mesh.face_corners(face)), polygon::diameter(&mesh.face_corners(face)));
+        // Rounding of the cross products counts for faces much longer than wide.
+        let rounding = 8.0 * f64::EPSILON * size * size;
+        let difference = piece_area[face.index()] - area;
+        assert!(difference.abs() <= 1e-12 * area + rounding, "pieces of {face:?}: {difference:e} of {area}");
     }
     let all: Vec<DVec3> = mesh.vertices.iter().copied().map(DVec3::from_array).collect();
     let diagonal = polygon::diameter(&all);
@@ -159,8 +166,22 @@ pub fn planes(mesh: &Mesh) -> Vec<Vec<ElementId>> {
 /// Asserts that within each plane every edge is used once in each direction or lies on the rim, and that no vertex
 /// lies inside an edge of the rim. Returns the number of edges used twice.
 pub fn assert_conforming(mesh: &Mesh) -> usize {
+    assert_conforming_among(mesh, planes(mesh))
+}
+
+/// The same within each side of each face.
+pub fn assert_faces_conforming(mesh: &Mesh) -> usize {
+    let mut faces: HashMap<(FaceId, u32), Vec<ElementId>> = HashMap::new();
+    for element in mesh.element_ids() {
+        let side = mesh.element_sides[element.index()];
+        faces.entry((mesh.element_face(element), side)).or_default().push(element);
+    }
+    assert_conforming_among(mesh, faces.into_values().collect())
+}
+
+fn assert_conforming_among(mesh: &Mesh, sets: Vec<Vec<ElementId>>) -> usize {
     let mut interior = 0;
-    for plane in planes(mesh) {
+    for plane in sets {
         let mut uses: HashMap<(VertexId, VertexId), usize> = HashMap::new();
         let mut vertices: Vec<VertexId> = Vec::new();
         for &element in &plane {
@@ -186,12 +207,51 @@ pub fn assert_conforming(mesh: &Mesh) -> usize {
                 let within = along > 1e-9 && along < 1.0 - 1e-9;
                 assert!(
                     !within || distance > 1e-9 * (q - p).length(),
-                    "{vertex:?} lies inside edge {a:?} {b:?}"
+                    "{vertex:?} at {x} lies inside edge {a:?} {b:?} from {p} to {q}"
                 );
             }
         }
     }
     interior
+}
+
+/// Asserts that where faces meet no vertex lies inside an edge: neither within the rims of the faces nor along lines on
+/// them, whatever face the vertex is of. What is inside a face cannot meet another, [`assert_conforming`] looks there.
+pub fn assert_faces_meet(mesh: &Mesh) {
+    let sorted = |a: VertexId, b: VertexId| (a.min(b), a.max(b));
+    let lines: std::collections::HashSet<_> = mesh.lines.iter().map(|l| sorted(l.from, l.to)).collect();
+    let mut uses: HashMap<(FaceId, u32, (VertexId, VertexId)), usize> = HashMap::new();
+    for element in mesh.element_ids() {
+        let (face, side) = (mesh.element_face(element), mesh.element_sides[element.index()]);
+        let ring = mesh.elements.row(element.index());
+        for k in 0..ring.len() {
+            *uses.entry((face, side, sorted(ring[k], ring[(k + 1) % ring.len()]))).or_default() += 1;
+        }
+    }
+    uses.retain(|(_, _, edge), &mut count| count == 1 || lines.contains(edge));
+    let mut used: Vec<VertexId> = uses.keys().flat_map(|&(_, _, (a, b))| [a, b]).collect();
+    used.sort_unstable();
+    used.dedup();
+    let all: Vec<DVec3> = used.iter().map(|&v| mesh.position(v)).collect();
+    let weld = 1e-9 * polygon::diameter(&all);
+    for &(face, _, (a, b)) in uses.keys() {
+        let (p, q) = (mesh.position(a), mesh.position(b));
+        let (low, high) = (p.min(q) - weld, p.max(q) + weld);
+        for (&vertex, &x) in used.iter().zip(&all) {
+            if !(x.cmpge(low).all() && x.cmple(high).all()) {
+                continue;
+            }
+            let along = (x - p).dot(q - p) / (q - p).length_squared();
+            let near = x.distance(p.lerp(q, along)) <= 0.5 * weld;
+            let apart = x.distance(p) > 2.0 * weld && x.distance(q) > 2.0 * weld;
+            assert!(
+                !(near && apart && along > 0.0 && along < 1.0),
+                "{vertex:?} at {x} lies inside an edge of {face:?} from {a:?} at {p} to {b:?} at {q}, {:.2e} of the \
+                 tolerance beside it",
+                x.distance(p.lerp(q, along)) / weld
+            );
+        }
+    }
 }
 
 /// OBJ text of an axis-aligned box with outward faces and a bottom only where asked; `first` is the number of its
