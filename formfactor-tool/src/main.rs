@@ -3,11 +3,12 @@
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 use formfactor_tool::closure::Closure;
+use formfactor_tool::foreign::Format;
 use formfactor_tool::options::Storage;
 use formfactor_tool::skips::Skip;
-use formfactor_tool::{compare, compute, export, info, merge, method};
+use formfactor_tool::{compare, compute, export, import, info, merge, method};
 use interchange::grouping::By;
-use interchange::tool::{Common, EXIT_CODES, Finish, exit_code, print_data};
+use interchange::tool::{Common, EXIT_CODES, Finish, exit_code, not_negative, print_data};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -64,9 +65,25 @@ enum Command {
         /// Sum over elements, faces of the scene, or groups
         #[arg(long, value_enum)]
         by: By,
-        /// Table to write: .csv, .npy or .mtx
+        /// Table to write; its ending says the format: .csv, .npy, .npz, .mtx, .rmx or .vf
         #[arg(short, long, value_name = "FILE")]
         output: PathBuf,
+        /// Format, whatever the ending
+        #[arg(long, value_enum)]
+        format: Option<Format>,
+    },
+    /// Make a matrix file of factors F(i -> j) that another program computed, and say what is wrong with them
+    Import {
+        /// Table to read: numpy (.npy), scipy (.npz), MatrixMarket, Radiance, View3D or CSV, told by what is in it
+        table: PathBuf,
+        /// Mesh the factors belong to
+        #[arg(long, value_name = "FILE")]
+        mesh: PathBuf,
+        /// Matrix file to write
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
+        #[command(flatten)]
+        wishes: import::Wishes,
     },
     /// Show by how much two matrices of one mesh differ
     Compare {
@@ -81,7 +98,7 @@ enum Command {
         #[arg(long)]
         json: bool,
         /// Fail (exit 1) where the sum over j of |dF_ij| is above this in some row
-        #[arg(long, value_name = "E", value_parser = compare::parse_most)]
+        #[arg(long, value_name = "E", value_parser = not_negative)]
         max: Option<f64>,
     },
     /// Describe a matrix file on one page
@@ -105,7 +122,12 @@ fn run(cli: Cli) -> anyhow::Result<Finish> {
         Command::Merge { shards, output, closure } => {
             return merge::run(&merge::Request { shards, output, closure }, &cli.common);
         }
-        Command::Export { matrix, mesh, by, output } => export::run(&matrix, &mesh, by, &output)?,
+        Command::Export { matrix, mesh, by, output, format } => {
+            export::run(&matrix, &mesh, by, format, &output)?;
+        }
+        Command::Import { table, mesh, output, wishes } => {
+            return import::run(&import::Request { table, mesh, output, wishes });
+        }
         Command::Compare { first, second, mesh, json, max } => {
             let difference = compare::Difference::between(&first, &second, mesh.as_deref())?;
             print_data(&difference.describe(json)?)?;

@@ -20,6 +20,15 @@ pub fn positive(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "expected a number above 0".into())
 }
 
+/// Value of a flag that is a finite number of at least 0, such as `--max`.
+///
+/// # Errors
+/// What was expected, for clap, which names the flag and what was given.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse().ok().filter(|&number: &f64| number.is_finite() && number >= 0.0);
+    number.ok_or_else(|| "expected a number of at least 0".into())
+}
+
 /// Flags every subcommand takes. None of them changes an output.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Common {

@@ -9,7 +9,8 @@
 //! - [`sized`] finds the size: where light changes ([`light`], [`lit`]), where its interpolation asks for it ([`adaptive`]),
 //!   or where a solution is worst ([`solved`]); [`conform`] makes planes meet.
 //!
-//! [`assemble`] numbers elements ([`cluster`]) and nodes ([`nodes`]); [`info`] and [`picture`] show the result.
+//! [`assemble`] numbers elements ([`cluster`]) and nodes ([`nodes`]); [`info`] and [`picture`] show the result, [`mod@compare`]
+//! sets two beside each other, [`export`] hands one to other programs.
 //!
 //! # Limitations
 //! With a number of elements as budget, shape yields to it: faces much narrower than the elements get narrow ones. Two
@@ -24,6 +25,7 @@ pub mod box_tree;
 pub mod build;
 pub mod clean;
 pub mod cluster;
+pub mod compare;
 pub mod conform;
 pub mod contact;
 pub mod convex;
@@ -31,6 +33,7 @@ pub mod depfile;
 pub mod discontinuity;
 pub mod duplicates;
 pub mod eee;
+pub mod export;
 pub mod features;
 pub mod frame;
 pub mod given;

@@ -10,7 +10,7 @@ use mesh_tool::adaptive::INTERPOLATION_ERROR;
 use mesh_tool::discontinuity::Order;
 use mesh_tool::solved::Solved;
 use mesh_tool::steps::{Off, Skip, Step};
-use mesh_tool::{NAME, Options, VERSION, depfile, info, picture};
+use mesh_tool::{NAME, Options, VERSION, compare, depfile, export, info, picture};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -61,6 +61,35 @@ enum Command {
         /// Only the plane with this number
         #[arg(long, value_name = "N")]
         plane: Option<usize>,
+    },
+    /// Write the elements for other programs: .ply, .vtu, .glb, .obj, .rad (Radiance) or .vs3 (View3D)
+    Export {
+        /// Mesh (.mesh); colours are those of the .materials beside it
+        file: PathBuf,
+        /// File to write; its ending says the format
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
+    },
+    /// Turn a scene of View3D or Radiance into an OBJ with its MTL
+    Import {
+        /// Scene (.vs3 or .rad)
+        file: PathBuf,
+        /// OBJ to write; the MTL goes beside it
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
+    },
+    /// Show by how much two meshes differ
+    Compare {
+        /// Mesh (.mesh)
+        first: PathBuf,
+        /// Mesh to compare it with
+        second: PathBuf,
+        /// As JSON, for scripts
+        #[arg(long)]
+        json: bool,
+        /// Fail (exit 1) where more than this part of the area is in elements that only one has
+        #[arg(long, value_name = "E", value_parser = tool::not_negative)]
+        max: Option<f64>,
     },
     /// Say what is in a mesh or a material table
     Info {
@@ -196,6 +225,17 @@ fn run(line: &CommandLine) -> anyhow::Result<Finish> {
             }
         }
         Command::Picture { file, output, plane } => picture::draw(file, output, *plane)?,
+        Command::Export { file, output } => export::write(file, output)?,
+        Command::Import { file, output } => {
+            for finding in export::convert(file, output)? {
+                tracing::warn!("{finding}");
+            }
+        }
+        Command::Compare { first, second, json, max } => {
+            let difference = compare::Difference::between(first, second)?;
+            tool::print_data(&difference.describe(*json))?;
+            difference.check(*max)?;
+        }
         Command::Info { file, json } => tool::print_data(&info::describe(file, *json)?)?,
     }
     Ok(Finish::Done)

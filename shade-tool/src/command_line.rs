@@ -1,6 +1,7 @@
 //! Flags, and the three subcommands from files to files.
 
 use crate::camera::{Camera, Lens, Wishes};
+use crate::compare::Difference;
 use crate::error::Result;
 use crate::exr_file::{self, Fit, Precision};
 use crate::lit_scene::LitScene;
@@ -13,7 +14,7 @@ use interchange::atomic_write::refuse_input;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
 use interchange::scene::Settings;
-use interchange::tool::{Common, EXIT_CODES, Finish, positive, print_data};
+use interchange::tool::{Common, EXIT_CODES, Finish, not_negative, positive, print_data};
 use std::path::{Path, PathBuf};
 
 /// Largest picture side: 2^16 pixels, beyond any display or print.
@@ -40,6 +41,8 @@ pub enum Command {
     Render(Box<RenderArguments>),
     /// Irradiance at the points of a table, by exact gathering
     Probe(ProbeArguments),
+    /// Show by how much two pictures differ
+    Compare(CompareArguments),
     /// Tell what a picture holds
     Info(InfoArguments),
 }
@@ -125,6 +128,21 @@ pub struct ProbeArguments {
     pub output: PathBuf,
 }
 
+/// Flags of `compare`.
+#[derive(Debug, Args)]
+pub struct CompareArguments {
+    /// Picture (.exr or .png)
+    pub first: PathBuf,
+    /// Picture to compare it with, of the same kind and size
+    pub second: PathBuf,
+    /// Tell it as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Fail (exit 1) where a channel's RMS difference is above this part of its mean
+    #[arg(long, value_name = "E", value_parser = not_negative)]
+    pub max: Option<f64>,
+}
+
 /// Flags of `info`.
 #[derive(Debug, Args)]
 pub struct InfoArguments {
@@ -151,6 +169,7 @@ impl Arguments {
         match &self.command {
             Command::Render(arguments) => run_render(arguments, &self.common)?,
             Command::Probe(arguments) => run_probe(arguments, &self.common)?,
+            Command::Compare(arguments) => run_compare(arguments)?,
             Command::Info(arguments) => run_info(arguments)?,
         }
         Ok(Finish::Done)
@@ -214,6 +233,23 @@ fn run_probe(arguments: &ProbeArguments, common: &Common) -> Result<()> {
     report.phase("write", || probe::write(&arguments.output, &points, &irradiance))?;
     report.write_beside(&arguments.output)?;
     Ok(())
+}
+
+fn run_compare(arguments: &CompareArguments) -> Result<()> {
+    let difference = Difference::between(&arguments.first, &arguments.second)?;
+    let text = if arguments.json { format!("{:#}\n", difference.json()) } else { difference.text() };
+    print_data(&text).map_err(|e| interchange::Error::io(Path::new("stdout"), "write", e))?;
+    let found = difference.relative();
+    match arguments.max {
+        Some(most) if found > most => {
+            let message = format!(
+                "differs from {} by {found:.3e} of the mean, above --max {most:e}",
+                arguments.first.display()
+            );
+            Err(interchange::Error::whole(&arguments.second, message).into())
+        }
+        _ => Ok(()),
+    }
 }
 
 fn run_info(arguments: &InfoArguments) -> Result<()> {

@@ -84,7 +84,8 @@ pub fn read(path: &Path) -> Result<PictureInfo> {
     Ok(PictureInfo { layers: layers.collect(), attributes })
 }
 
-fn check_kind(path: &Path) -> Result<()> {
+/// Refuses what is no OpenEXR picture; a file of another stage by the name of the tool that shows it.
+pub(crate) fn check_kind(path: &Path) -> Result<()> {
     let mut file = std::fs::File::open(path).map_err(|e| interchange::Error::io(path, "open", e))?;
     let mut first = [0; 4];
     let is_picture = file.read_exact(&mut first).is_ok() && first == MAGIC;

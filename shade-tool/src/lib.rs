@@ -13,6 +13,7 @@
 
 pub mod camera;
 pub mod command_line;
+pub mod compare;
 pub mod convex;
 pub mod error;
 pub mod exr_file;

@@ -109,7 +109,9 @@ impl Scene<'_> {
                 0 if k == 5 => {}
                 v if (1..=self.surface.points.len()).contains(&v) => corners.push(v as u32 - 1),
                 v => {
-                    return Err(self.wrong(line, format!("found vertex {v} of {}", self.surface.points.len())));
+                    return Err(
+                        self.wrong(line, format!("found vertex {v} of {}", self.surface.points.len()))
+                    );
                 }
             }
         }
