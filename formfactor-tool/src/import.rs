@@ -104,10 +104,10 @@ pub fn run(request: &Request) -> anyhow::Result<Finish> {
     let factors = Imported { table: &table, keys: &keys, areas: &areas };
     factors.check_entries(table_path)?;
     factors.check_areas(&mut report);
-    let findings = report.phase("check", || factors.findings());
+    let stated = wishes.tolerance.unwrap_or(0.0);
+    let findings = report.phase("check", || factors.findings(stated));
     findings.say(&mut report, wishes.reciprocity);
 
-    let stated = wishes.tolerance.unwrap_or(0.0);
     let row_errors = findings.row_errors(wishes.reciprocity, stated);
     let found = row_errors.iter().copied().fold(0.0, f64::max);
     let keep = wishes.reciprocity == Reciprocity::Keep;
@@ -210,6 +210,7 @@ struct Findings {
     /// The pair of elements that differs most, with both factors from the first's side.
     worst_pair: (usize, usize, f64, f64),
     largest_sum: (usize, f64),
+    /// Rows whose sum is above 1 by more than rounding and the stated error.
     above_one: usize,
     /// Elements that see themselves.
     to_itself: usize,
@@ -257,7 +258,7 @@ impl Imported<'_> {
         self.table.get(self.keys[from] as usize, self.keys[to] as usize)
     }
 
-    fn findings(&self) -> Findings {
+    fn findings(&self, stated: f64) -> Findings {
         let count = self.areas.len();
         let mut element_of = vec![usize::MAX; self.table.count()];
         self.keys.iter().enumerate().for_each(|(element, &key)| element_of[key as usize] = element);
@@ -302,7 +303,7 @@ impl Imported<'_> {
             if sum > found.largest_sum.1 {
                 found.largest_sum = (i, sum);
             }
-            found.above_one += usize::from(sum > 1.0 + ROUNDING);
+            found.above_one += usize::from(sum > 1.0 + ROUNDING.max(stated));
         }
         found.worst_reciprocity = found.reciprocity.iter().copied().fold(0.0, f64::max);
         found

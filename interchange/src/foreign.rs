@@ -5,7 +5,7 @@
 //!
 //! | ending | what is kept | numbers |
 //! |---|---|---|
-//! | `.ply` | all fields; colours as sRGB bytes | f64, binary |
+//! | `.ply` | all fields; colours as sRGB bytes | 17 digits |
 //! | `.vtu` | all fields; colours linear | f64, base64 |
 //! | `.glb` | fields of the points, colours linear; one node per group | f32 (all that glTF has) |
 //! | `.obj` | groups, materials (`.mtl` beside it), colours after the coordinates | 17 digits |

@@ -9,7 +9,7 @@
 //! - [`sized`] finds the size: where light changes ([`light`], [`lit`]), where its interpolation asks for it ([`adaptive`]),
 //!   or where a solution is worst ([`solved`]); [`conform`] makes planes meet.
 //!
-//! [`assemble`] numbers elements ([`cluster`]) and nodes ([`nodes`]); [`info`] and [`picture`] show the result, [`mod@compare`]
+//! [`assemble`] numbers elements ([`cluster`]) and nodes ([`nodes`]); [`info`], [`look`] and [`picture`] show the result, [`mod@compare`]
 //! sets two beside each other, [`export`] hands one to other programs.
 //!
 //! # Limitations
@@ -41,6 +41,7 @@ pub mod hidden;
 pub mod info;
 pub mod light;
 pub mod lit;
+pub mod look;
 pub mod merge_lines;
 pub mod meshed;
 pub mod nodes;

@@ -8,6 +8,7 @@ use interchange::scene::Scene;
 use interchange::tool::{self, Common, Finish};
 use mesh_tool::adaptive::INTERPOLATION_ERROR;
 use mesh_tool::discontinuity::Order;
+use mesh_tool::look::{self, Look};
 use mesh_tool::solved::Solved;
 use mesh_tool::steps::{Off, Skip, Step};
 use mesh_tool::{NAME, Options, VERSION, compare, depfile, export, info, picture};
@@ -98,6 +99,12 @@ enum Command {
         /// As JSON, for scripts
         #[arg(long)]
         json: bool,
+        /// Only element I, from 1, with its corners
+        #[arg(long, value_name = "I")]
+        element: Option<u32>,
+        /// Only this group
+        #[arg(long, value_name = "NAME", conflicts_with = "element")]
+        group: Option<String>,
     },
 }
 
@@ -236,7 +243,13 @@ fn run(line: &CommandLine) -> anyhow::Result<Finish> {
             tool::print_data(&difference.describe(*json))?;
             difference.check(*max)?;
         }
-        Command::Info { file, json } => tool::print_data(&info::describe(file, *json)?)?,
+        Command::Info { file, json, element, group } => {
+            let look = element.map(Look::Element).or(group.clone().map(Look::Group));
+            tool::print_data(&match look {
+                Some(look) => look::describe(file, &look, *json)?,
+                None => info::describe(file, *json)?,
+            })?;
+        }
     }
     Ok(Finish::Done)
 }

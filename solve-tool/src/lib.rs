@@ -42,6 +42,7 @@ pub mod export;
 pub mod info;
 pub mod interval;
 mod kernel;
+pub mod look;
 pub mod lossless;
 pub mod method;
 mod part;

@@ -8,6 +8,7 @@ use interchange::tool::{Common, EXIT_CODES, Finish, exit_code, not_negative, pos
 use solve_tool::compare::{Difference, Request};
 use solve_tool::export::{ExportRequest, Quantity, Units};
 use solve_tool::interval::Spread;
+use solve_tool::look::Look;
 use solve_tool::run::SolveRequest;
 use solve_tool::skips::{Skip, Skips};
 use solve_tool::snapshot::Plan;
@@ -132,6 +133,15 @@ enum Command {
         /// For machines
         #[arg(long)]
         json: bool,
+        /// Only what it says of element I, from 1
+        #[arg(long, value_name = "I")]
+        element: Option<u32>,
+        /// Only what it says of a group: means, and sums of powers
+        #[arg(long, value_name = "NAME", requires = "mesh", conflicts_with = "element")]
+        group: Option<String>,
+        /// The mesh it was computed on, for areas and names
+        #[arg(long, value_name = "MESH")]
+        mesh: Option<PathBuf>,
     },
 }
 
@@ -214,7 +224,12 @@ fn run(command: Command) -> anyhow::Result<Finish> {
             print_data(&difference.describe(json))?;
             difference.check(max)?;
         }
-        Command::Info { file, json } => print_data(&solve_tool::info::describe(&file, json)?)?,
+        Command::Info { file, json, element, group, mesh } => {
+            print_data(&match element.map(Look::Element).or(group.map(Look::Group)) {
+                Some(look) => solve_tool::look::describe(&file, mesh.as_deref(), &look, json)?,
+                None => solve_tool::info::describe(&file, json)?,
+            })?;
+        }
     }
     Ok(Finish::Done)
 }
