@@ -39,7 +39,7 @@ pub fn describe(path: &Path, mesh_path: Option<&Path>, look: &Look, as_json: boo
         }
     };
     let made_by = format!("{} {} {}", provenance.tool, provenance.version, provenance.flags.join(" "));
-    let (kind, title, elements) = match look {
+    let (kind, title, elements, hidden) = match look {
         Look::Element(number) => {
             let count = solution.radiosity.len();
             if !(1..=count).contains(&(*number as usize)) {
@@ -51,7 +51,7 @@ pub fn describe(path: &Path, mesh_path: Option<&Path>, look: &Look, as_json: boo
                 let group = &mesh.groups[mesh.element_group(element).index()];
                 format!(" {group}, face {}", mesh.element_input(element) + 1)
             });
-            ("element", format!("{number}{place}"), vec![*number as usize - 1])
+            ("element", format!("{number}{place}"), vec![*number as usize - 1], 0.0)
         }
         Look::Group(name) => {
             let Some(mesh) = &mesh else { bail!("--group needs --mesh: the solution alone knows no groups") };
@@ -63,22 +63,25 @@ pub fn describe(path: &Path, mesh_path: Option<&Path>, look: &Look, as_json: boo
                 );
                 bail!("no group is named {name}; {near}")
             };
-            let of = Grouping::new(mesh, By::Group).key_of_element;
-            ("group", name.clone(), (0..of.len()).filter(|&i| of[i] as usize == key).collect())
+            let grouping = Grouping::new(mesh, By::Group);
+            let of = &grouping.key_of_element;
+            let elements = (0..of.len()).filter(|&i| of[i] as usize == key).collect();
+            ("group", name.clone(), elements, grouping.hidden_areas[key])
         }
     };
     let area_of = |i: usize| {
         mesh.as_ref().map(|mesh| geometry::polygon::area(&mesh.element_corners(ElementId::new(i))))
     };
     let areas: Vec<f64> = elements.iter().map(|&i| area_of(i).unwrap_or(1.0)).collect();
-    let quantities = quantities(&solution, &elements, &areas);
+    let total = hidden + areas.iter().sum::<f64>();
+    let quantities = quantities(&solution, &elements, &areas, total);
     let summary = &solution.summary;
     if as_json {
         let mut data = Map::new();
         data.insert("kind".into(), json!(kind));
         data.insert(kind.into(), json!(title));
         data.insert("elements".into(), json!(elements.len()));
-        data.insert("area".into(), mesh.as_ref().map_or(Value::Null, |_| json!(areas.iter().sum::<f64>())));
+        data.insert("area".into(), mesh.as_ref().map_or(Value::Null, |_| json!(total)));
         quantities.iter().for_each(|(name, _, numbers)| {
             data.insert((*name).into(), json!(numbers));
         });
@@ -94,7 +97,13 @@ pub fn describe(path: &Path, mesh_path: Option<&Path>, look: &Look, as_json: boo
     };
     line(kind, title);
     if mesh.is_some() {
-        line("area", format!("{:.6e} of {} elements", areas.iter().sum::<f64>(), elements.len()));
+        line(
+            "area",
+            format!(
+                "{total:.6e}, {hidden:.6e} of it hidden and dark, the rest in {} elements",
+                elements.len()
+            ),
+        );
     }
     for (name, unit, numbers) in &quantities {
         let named = |(value, channel): (&f64, &&str)| format!("{value:.6e} {channel}");
@@ -109,13 +118,14 @@ pub fn describe(path: &Path, mesh_path: Option<&Path>, look: &Look, as_json: boo
     Ok(text)
 }
 
-/// Name, unit and numbers of all that the solution holds: means over the areas, and sums of what is counted in watts.
+/// Name, unit and numbers of all that the solution holds: means over the total area, hidden parts included as tables do, and
+/// sums of what is counted in watts.
 fn quantities(
     solution: &Solution,
     elements: &[usize],
     areas: &[f64],
+    total: f64,
 ) -> Vec<(&'static str, &'static str, Numbers)> {
-    let total: f64 = areas.iter().sum();
     let mean = |values: &dyn Fn(usize) -> f64| {
         // A group of which nothing is left is dark.
         let sum: f64 = elements.iter().zip(areas).map(|(&i, area)| area * values(i)).sum();
@@ -138,7 +148,10 @@ fn quantities(
         }
     }
     if let Some(sums) = &details.row_sums {
-        found.push(("escapes", "of what leaves", vec![1.0 - mean(&|i| sums[i])]));
+        let kept: f64 = elements.iter().zip(areas).map(|(&i, area)| area * sums[i]).sum();
+        let visible: f64 = areas.iter().sum();
+        let escapes = if visible > 0.0 { 1.0 - kept / visible } else { 0.0 };
+        found.push(("escapes", "of what leaves", vec![escapes]));
     }
     if let Some(thermal) = &details.thermal {
         found.push((

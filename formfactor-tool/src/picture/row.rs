@@ -178,7 +178,7 @@ impl Painted {
                 });
             }
         }
-        let title = format!("F(each -> element {}, red); dark grey: not seen", self.element + 1);
+        let title = format!("F(each -> element {}, red), dark grey: not seen", self.element + 1);
         canvas.text(MARGIN, MARGIN / 2, 1, &title);
         canvas.frame(MARGIN - 1, 2 * MARGIN - 1, SIDE + 2, SIDE + 2, INK);
         self.scale.draw(&mut canvas, SIDE + 2 * MARGIN, 2 * MARGIN + font::LINE, 300);
