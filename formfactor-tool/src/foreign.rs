@@ -24,6 +24,7 @@ mod zip;
 pub use table::{RowSource, Table};
 
 use clap::ValueEnum;
+use interchange::atomic_write::is_stdout;
 use interchange::error::{Error, Result};
 use std::path::Path;
 
@@ -55,13 +56,15 @@ const ENDINGS: [(&str, Format); 6] = [
 ];
 
 impl Format {
-    /// The one asked for, or else the one that the name's ending asks for.
+    /// The one asked for, or else the one that the name's ending asks for; CSV for standard output.
     ///
     /// # Errors
     /// The ending is none of the known ones.
     pub fn of(path: &Path, asked: Option<Format>) -> Result<Self> {
         let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-        let by_ending = || ENDINGS.iter().find(|(name, _)| *name == ending).map(|(_, format)| *format);
+        let for_stdout = is_stdout(path).then_some(Format::Csv);
+        let by_ending =
+            || for_stdout.or(ENDINGS.iter().find(|(name, _)| *name == ending).map(|(_, format)| *format));
         asked.or_else(by_ending).ok_or_else(|| {
             let names: Vec<String> = ENDINGS.iter().map(|(name, _)| format!(".{name}")).collect();
             let message =

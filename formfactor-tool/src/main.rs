@@ -9,13 +9,24 @@ use formfactor_tool::options::Storage;
 use formfactor_tool::skips::Skip;
 use formfactor_tool::{compare, compute, export, import, info, merge, method, picture};
 use interchange::grouping::By;
-use interchange::tool::{Common, EXIT_CODES, Finish, exit_code, not_negative, print_data};
+use interchange::tool::{Common, EXIT_CODES, Finish, examples, exit_code, not_negative, pages, print_data};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+/// Lines to try, in `--help` and the manual page.
+const EXAMPLES: [&str; 7] = [
+    "formfactor-tool compute box.mesh -o box.ff --tolerance 1e-3",
+    "formfactor-tool info box.ff",
+    "formfactor-tool info box.ff --group floor light --mesh box.mesh",
+    "formfactor-tool export box.ff --mesh box.mesh --by group -o factors.csv",
+    "formfactor-tool import factors.npz --mesh box.mesh -o again.ff --tolerance 1e-3",
+    "formfactor-tool compare box.ff again.ff --max 0",
+    "formfactor-tool picture box.ff -o matrix.png",
+];
+
 /// Exchange matrix S = diag(A) F of a mesh, occlusion included
 #[derive(Debug, Parser)]
-#[command(name = "formfactor-tool", version, after_help = EXIT_CODES)]
+#[command(name = "formfactor-tool", version, after_help = EXIT_CODES, after_long_help = examples(&EXAMPLES))]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -120,6 +131,12 @@ enum Command {
         #[arg(long, value_name = "E", value_parser = not_negative)]
         max: Option<f64>,
     },
+    /// Write manual pages and completions below a folder such as /usr/local
+    #[command(hide = true)]
+    Pages {
+        /// Folder
+        prefix: PathBuf,
+    },
     /// Describe a matrix file on one page
     Info {
         /// Matrix file, one shard, or all files of one computed in shards
@@ -188,6 +205,7 @@ fn run(cli: Cli) -> anyhow::Result<Finish> {
             print_data(&difference.describe(json)?)?;
             difference.check(max)?;
         }
+        Command::Pages { prefix } => pages::write(Cli::command(), &prefix)?,
         Command::Info { file, json, look, mesh } => print_data(&match look.look() {
             Some(look) => look::describe(&file, mesh.as_deref(), &look, json)?,
             None => info::describe(&file, json)?,

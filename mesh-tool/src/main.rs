@@ -1,6 +1,6 @@
 //! Command line of mesh-tool.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use interchange::atomic_write;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
@@ -15,9 +15,18 @@ use mesh_tool::{NAME, Options, VERSION, compare, depfile, export, info, picture}
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+/// Lines to try, in `--help` and the manual page.
+const EXAMPLES: [&str; 5] = [
+    "mesh-tool build tests/scenes/cornell_blocks.obj -o box.mesh --elements 300",
+    "mesh-tool info box.mesh",
+    "mesh-tool picture box.mesh -o box.svg",
+    "mesh-tool export box.mesh -o box.glb",
+    "mesh-tool import box.vs3 -o from_view3d.obj",
+];
+
 /// Turns a scene into elements
 #[derive(Debug, Parser)]
-#[command(name = "mesh-tool", version, about, after_help = tool::EXIT_CODES)]
+#[command(name = "mesh-tool", version, about, after_help = tool::EXIT_CODES, after_long_help = tool::examples(&EXAMPLES))]
 struct CommandLine {
     #[command(subcommand)]
     command: Command,
@@ -91,6 +100,12 @@ enum Command {
         /// Fail (exit 1) where more than this part of the area is in elements that only one has
         #[arg(long, value_name = "E", value_parser = tool::not_negative)]
         max: Option<f64>,
+    },
+    /// Write manual pages and completions below a folder such as /usr/local
+    #[command(hide = true)]
+    Pages {
+        /// Folder
+        prefix: PathBuf,
     },
     /// Say what is in a mesh or a material table
     Info {
@@ -231,6 +246,7 @@ fn run(line: &CommandLine) -> anyhow::Result<Finish> {
                 )));
             }
         }
+        Command::Pages { prefix } => tool::pages::write(CommandLine::command(), prefix)?,
         Command::Picture { file, output, plane } => picture::draw(file, output, *plane)?,
         Command::Export { file, output } => export::write(file, output)?,
         Command::Import { file, output } => {

@@ -46,6 +46,19 @@ fn an_exported_obj_is_the_same_scene_in_pieces() {
     assert!(colours.contains("Kd") && colours.contains("Ke"), "{colours}");
 }
 
+/// Corners of every element to the last bit, from the least one on, in whatever order the elements are.
+fn squares(path: &Path) -> std::collections::BTreeSet<Vec<[u64; 3]>> {
+    let mesh = interchange::mesh::Mesh::read(path).unwrap().0;
+    let ring = |row: &[interchange::ids::VertexId]| {
+        let mut corners: Vec<[u64; 3]> =
+            row.iter().map(|v| mesh.vertices[v.index()].map(f64::to_bits)).collect();
+        let least = (0..corners.len()).min_by_key(|&k| corners[k]).unwrap();
+        corners.rotate_left(least);
+        corners
+    };
+    mesh.elements.rows().map(ring).collect()
+}
+
 /// Through the formats of View3D and of Radiance and back: the same squares, to the last bit.
 #[test]
 fn scenes_of_other_programs_come_back() {
@@ -55,9 +68,7 @@ fn scenes_of_other_programs_come_back() {
         tool(folder).args(["export", "s.mesh", "-o", name]).assert().success();
         tool(folder).args(["import", name, "-o", "back.obj"]).assert().success();
         tool(folder).args(["build", "back.obj", "-o", "back.mesh"]).assert().success();
-        let found = Difference::between(&folder.join("s.mesh"), &folder.join("back.mesh")).unwrap();
-        assert_eq!((found.sides[1].elements, found.sides[1].area), (6, found.sides[0].area), "{name}");
-        assert!(found.same_occluders, "{name}");
+        assert_eq!(squares(&folder.join("back.mesh")), squares(&folder.join("s.mesh")), "{name}");
     }
     // View3D keeps the names of groups as one word; all six are there.
     tool(folder).args(["import", "cube.vs3", "-o", "back.obj"]).assert().success();

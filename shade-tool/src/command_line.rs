@@ -14,7 +14,7 @@ use interchange::atomic_write::refuse_input;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
 use interchange::scene::Settings;
-use interchange::tool::{Common, EXIT_CODES, Finish, not_negative, positive, print_data};
+use interchange::tool::{Common, EXIT_CODES, Finish, examples, not_negative, pages, positive, print_data};
 use std::path::{Path, PathBuf};
 
 /// Largest picture side: 2^16 pixels, beyond any display or print.
@@ -22,9 +22,17 @@ const LARGEST_SIDE: u32 = 1 << 16;
 /// Largest picture: 2^28 pixels, 6 GB while it is made.
 const LARGEST_PICTURE: u64 = 1 << 28;
 
+/// Lines to try, in `--help` and the manual page.
+const EXAMPLES: [&str; 4] = [
+    "shade-tool render box.sol --mesh box.mesh -o box.exr --png box.png --camera tests/scenes/cornell_blocks.toml",
+    "shade-tool info box.exr",
+    "shade-tool compare box.exr box.exr --max 0",
+    "shade-tool probe box.sol --mesh box.mesh --points points.csv -o lit.csv",
+];
+
 /// Radiosity to pictures and points.
 #[derive(Debug, Parser)]
-#[command(name = TOOL, version, about, after_help = EXIT_CODES)]
+#[command(name = TOOL, version, about, after_help = EXIT_CODES, after_long_help = examples(&EXAMPLES))]
 pub struct Arguments {
     /// Flags of all tools.
     #[command(flatten)]
@@ -43,6 +51,12 @@ pub enum Command {
     Probe(ProbeArguments),
     /// Show by how much two pictures differ
     Compare(CompareArguments),
+    /// Write manual pages and completions below a folder such as /usr/local
+    #[command(hide = true)]
+    Pages {
+        /// Folder
+        prefix: PathBuf,
+    },
     /// Tell what a picture holds
     Info(InfoArguments),
 }
@@ -170,6 +184,7 @@ impl Arguments {
             Command::Render(arguments) => run_render(arguments, &self.common)?,
             Command::Probe(arguments) => run_probe(arguments, &self.common)?,
             Command::Compare(arguments) => run_compare(arguments)?,
+            Command::Pages { prefix } => pages::write(Arguments::command(), prefix)?,
             Command::Info(arguments) => run_info(arguments)?,
         }
         Ok(Finish::Done)

@@ -4,7 +4,9 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 use interchange::foreign::Format;
 use interchange::grouping::By;
-use interchange::tool::{Common, EXIT_CODES, Finish, exit_code, not_negative, positive, print_data};
+use interchange::tool::{
+    Common, EXIT_CODES, Finish, examples, exit_code, not_negative, pages, positive, print_data,
+};
 use solve_tool::compare::{Difference, Request};
 use solve_tool::export::{ExportRequest, Quantity, Units};
 use solve_tool::interval::Spread;
@@ -16,9 +18,18 @@ use solve_tool::solve::Solver;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+/// Lines to try, in `--help` and the manual page.
+const EXAMPLES: [&str; 5] = [
+    "solve-tool solve box.ff --mesh box.mesh -o box.sol --tolerance 1e-3",
+    "solve-tool info box.sol",
+    "solve-tool export box.sol --mesh box.mesh --by group -o groups.csv",
+    "solve-tool export box.sol --mesh box.mesh -o box.vtu",
+    "solve-tool compare box.sol bounce.sol --mesh box.mesh",
+];
+
 /// Radiosity from an exchange matrix and materials.
 #[derive(Debug, Parser)]
-#[command(version, arg_required_else_help = true, after_help = EXIT_CODES)]
+#[command(name = "solve-tool", version, arg_required_else_help = true, after_help = EXIT_CODES, after_long_help = examples(&EXAMPLES))]
 struct Cli {
     #[command(flatten)]
     common: Common,
@@ -126,6 +137,12 @@ enum Command {
         #[arg(long, value_name = "E", value_parser = not_negative)]
         max: Option<f64>,
     },
+    /// Write manual pages and completions below a folder such as /usr/local
+    #[command(hide = true)]
+    Pages {
+        /// Folder
+        prefix: PathBuf,
+    },
     /// Describe a solution
     Info {
         /// Solution (.sol)
@@ -224,6 +241,7 @@ fn run(command: Command) -> anyhow::Result<Finish> {
             print_data(&difference.describe(json))?;
             difference.check(max)?;
         }
+        Command::Pages { prefix } => pages::write(Cli::command(), &prefix)?,
         Command::Info { file, json, element, group, mesh } => {
             print_data(&match element.map(Look::Element).or(group.map(Look::Group)) {
                 Some(look) => solve_tool::look::describe(&file, mesh.as_deref(), &look, json)?,
