@@ -57,7 +57,8 @@ fn manual_pages_and_completions_know_every_subcommand() {
 #[test]
 fn a_dash_is_standard_output() {
     let folder = tests::folder();
-    let chain = Chain::as_given(tests::scene("goral_cube.obj"), folder.path());
+    let chain =
+        Chain::as_given(tests::scene("goral_cube.obj"), folder.path()).with_tolerances("1e-3", "1e-2");
     chain.solve();
     for (name, input) in [("formfactor-tool", "ff"), ("solve-tool", "sol")] {
         let export = |output: &std::path::Path| {
