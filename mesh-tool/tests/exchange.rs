@@ -117,7 +117,7 @@ fn meshes_are_compared_by_what_they_share() {
     assert!((moved["moved"]["distance"].as_f64().unwrap() - 1e-3).abs() < 1e-12);
     assert_eq!(moved["moved"]["vertex"], corner + 1);
     let own = moved["second"]["own_elements"].as_u64().unwrap();
-    assert!(own >= 1 && own < 40, "{own}");
+    assert!((1..40).contains(&own), "{own}");
     let failed = tool(folder).args(["compare", "s.mesh", "moved.mesh", "--max", "0"]).assert().code(1);
     assert!(String::from_utf8_lossy(&failed.get_output().stderr).contains("above --max 0e0"));
 }

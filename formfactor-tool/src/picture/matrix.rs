@@ -80,8 +80,8 @@ pub fn picture(matrix: &Matrix) -> Result<Canvas> {
     let height = side.max(320) + 3 * MARGIN + font::LINE;
     let mut canvas = Canvas::new(side + LEGEND + 3 * MARGIN, height);
     let top = 2 * MARGIN;
-    for k in 0..sums.len() {
-        let colour = match (mean(k), stored[k]) {
+    for (k, &is_stored) in stored.iter().enumerate() {
+        let colour = match (mean(k), is_stored) {
             (f, _) if f > 0.0 => scale.colour(f),
             (_, true) => ZERO,
             (_, false) => ABSENT,
