@@ -1,7 +1,8 @@
 //! PLY: points with colours and fields as properties, polygons as lists with theirs.
 //!
 //! As text: every number in the digits that give its bits back. The binary form is half as long, but a widely used reader
-//! (meshio 5.3) mistakes properties of faces there, and takes bytes of colour for signed ones.
+//! (meshio 5.3) mistakes properties of faces there, and takes bytes of colour for signed ones. It also wants polygons of as
+//! many corners to stand together: triangles come first, and so on; the field `element` says which is which.
 
 use super::{Field, Surface, Values, srgb};
 use crate::atomic_write::{self, Outcome, WriteSeek};
@@ -47,7 +48,10 @@ pub fn write(path: &Path, surface: &Surface) -> Result<Outcome> {
             }
             values(out, &surface.point_fields, i)?;
         }
-        for (i, polygon) in surface.polygons.rows().enumerate() {
+        let mut order: Vec<usize> = (0..surface.polygons.len()).collect();
+        order.sort_by_key(|&i| surface.polygons.row(i).len());
+        for i in order {
+            let polygon = surface.polygons.row(i);
             write!(out, "{}", polygon.len())?;
             polygon.iter().try_for_each(|point| write!(out, " {point}"))?;
             values(out, &surface.polygon_fields, i)?;
@@ -108,7 +112,7 @@ mod tests {
              property double B_r\nproperty double B_g\nproperty double B_b\nend_header\n\
              0 0 0 0 188 255 0\n1 0 0 0 188 255 0\n1 1 0 0 188 255 0\n0 1 0 0 188 255 0\n\
              0.5 0.1 0.3333333333333333 0 188 255 0.3333333333333333\n\
-             4 0 1 2 3 1 1 2 3\n3 1 0 4 2 0.1 0.2 0.3\n"
+             3 1 0 4 2 0.1 0.2 0.3\n4 0 1 2 3 1 1 2 3\n"
         );
     }
 }
