@@ -180,7 +180,7 @@ endef
 
 # ---- The stages ------------------------------------------------------------------------------------------------------
 
-.PHONY: all test clean FORCE
+.PHONY: all install test clean FORCE
 all: $(P).exr $(P).png
 FORCE:
 
@@ -270,6 +270,13 @@ $(BIN)pipeline.made: $(sources) $(call missing,$(built))
 	@mv -f $@.start $@
 $(built): $(BIN)pipeline.made ; +
 endif
+
+# Programs, manual pages and completions (bash, zsh, fish) below PREFIX; DESTDIR in front of it for packages.
+PREFIX ?= /usr/local
+install: $(built)
+	mkdir -p $(call quoted,$(DESTDIR)$(PREFIX)/bin)
+	install -m 755 $(built) $(call quoted,$(DESTDIR)$(PREFIX)/bin)
+	$(foreach t,$(built),$t pages $(call quoted,$(DESTDIR)$(PREFIX)) &&) true
 
 # All tests, numbers included. The dev profile is optimised too, and links its many test programs in seconds.
 test:

@@ -235,12 +235,3 @@ fn side_json(side: &Matrix) -> Result<Value> {
         "row_sums": Spread::of(&side.row_sums()?).json(),
     }))
 }
-
-/// Value of `--max`.
-///
-/// # Errors
-/// What was expected.
-pub fn parse_most(text: &str) -> std::result::Result<f64, String> {
-    let number = text.trim().parse().ok().filter(|&number: &f64| number.is_finite() && number >= 0.0);
-    number.ok_or_else(|| "expected a number of at least 0".into())
-}

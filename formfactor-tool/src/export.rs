@@ -4,71 +4,70 @@
 //! sum of S over the elements of both, divided by the area of i. Both sides of a two-sided face count as one face,
 //! their areas summed. Rows are made in bands, so that a table of many elements needs no memory of its size.
 
-use interchange::atomic_write::{self, refuse_input};
+use crate::foreign::{self, Format, RowSource};
+use interchange::atomic_write::refuse_input;
 use interchange::error::Result;
 use interchange::grouping::{By, Grouping};
 use interchange::matrix::{BlockView, Matrix};
 use interchange::mesh::Mesh;
-use interchange::tables::{TableFormat, number, write_csv, write_npy};
-use std::io::SeekFrom;
 use std::ops::Range;
 use std::path::Path;
 
 /// Entries of the table held in memory at a time: 128 MB. Each band reads the blocks it touches once.
 const BAND_ENTRIES: usize = 1 << 24;
 
-/// Writes F of a matrix in one file or in all its parts to `output`, whose ending says how: `.csv` with a header of names, `.npy` as a dense float64 array,
-/// `.mtx` as MatrixMarket coordinates of the entries above 0.
-pub fn run(matrix_paths: &[impl AsRef<Path>], mesh_path: &Path, by: By, output: &Path) -> Result<()> {
-    let format = TableFormat::of(output, &[TableFormat::Csv, TableFormat::Npy, TableFormat::Mtx])?;
+/// Writes F of a matrix in one file or in all its parts to `output`, in the format asked for or else the one that its ending
+/// says.
+///
+/// # Errors
+/// The files do not belong together, the format is not known, or the output cannot be written.
+pub fn run(
+    matrix_paths: &[impl AsRef<Path>],
+    mesh_path: &Path,
+    by: By,
+    format: Option<Format>,
+    output: &Path,
+) -> Result<()> {
+    let format = Format::of(output, format)?;
     refuse_input(output, matrix_paths.iter().map(AsRef::as_ref).chain([mesh_path]))?;
     let (mesh, _, digest) = Mesh::read(mesh_path)?;
     let matrix = Matrix::open_all(matrix_paths)?;
     matrix.belongs_to(mesh_path, digest, mesh.element_count())?;
     let grouping = Grouping::new(&mesh, by);
-    let factors = Factors::new(&matrix, &grouping)?;
-    match format {
-        TableFormat::Csv => csv(&factors, &grouping, output),
-        TableFormat::Npy => {
-            let values = factors.rows().flat_map(|(_, row)| row);
-            write_npy(output, factors.count, factors.count, values).map(|_| ())
-        }
-        TableFormat::Mtx => mtx(&factors, by, output),
+    let table = Keyed { factors: Factors::new(&matrix, &grouping)?, grouping: &grouping };
+    let written = match format {
+        Format::Csv => foreign::csv::write(output, &table),
+        Format::Npy => foreign::npy::write(output, &table),
+        Format::Npz => foreign::npz::write(output, &table),
+        Format::MatrixMarket => foreign::matrix_market::write(output, &table),
+        Format::Radiance => foreign::radiance::write(output, &table),
+        Format::View3d => foreign::view3d::write(output, &table),
+    };
+    written.map(|_| ())
+}
+
+/// Factors with the names of their rows.
+struct Keyed<'a> {
+    factors: Factors<'a>,
+    grouping: &'a Grouping,
+}
+
+impl RowSource for Keyed<'_> {
+    fn count(&self) -> usize {
+        self.factors.count
     }
-}
 
-fn csv(factors: &Factors<'_>, grouping: &Grouping, output: &Path) -> Result<()> {
-    let header: Vec<String> =
-        std::iter::once(grouping.title.to_owned()).chain(grouping.labels.iter().cloned()).collect();
-    let lines = factors.rows().map(|(key, row)| {
-        std::iter::once(grouping.labels[key].clone()).chain(row.into_iter().map(number)).collect()
-    });
-    write_csv(output, &header, lines).map(|_| ())
-}
+    fn labels(&self) -> (&str, &[String]) {
+        (self.grouping.title, &self.grouping.labels)
+    }
 
-/// MatrixMarket by hand: three lines of header, then `row column value`, counting from 1. The number of entries is
-/// known at the end only; its place is kept free in the header.
-fn mtx(factors: &Factors<'_>, by: By, output: &Path) -> Result<()> {
-    let kind = clap::ValueEnum::to_possible_value(&by);
-    let kind = kind.as_ref().map_or("", |value| value.get_name());
-    atomic_write::write(output, |out| {
-        writeln!(out, "%%MatrixMarket matrix coordinate real general")?;
-        writeln!(out, "% F(row -> column), rows and columns by {kind}")?;
-        let size_line = out.stream_position()?;
-        let size = |entries: u64| format!("{} {} {entries:<20}\n", factors.count, factors.count);
-        out.write_all(size(0).as_bytes())?;
-        let mut entries = 0;
-        for (row, values) in factors.rows() {
-            for (column, &value) in values.iter().enumerate().filter(|(_, value)| **value != 0.0) {
-                writeln!(out, "{} {} {}", row + 1, column + 1, number(value))?;
-                entries += 1;
-            }
-        }
-        out.seek(SeekFrom::Start(size_line))?;
-        out.write_all(size(entries).as_bytes())?;
-        out.seek(SeekFrom::End(0)).map(|_| ())
-    })
-    .map(|_| ())
+    fn areas(&self) -> &[f64] {
+        &self.factors.areas
+    }
+
+    fn rows(&self) -> Box<dyn Iterator<Item = Vec<f64>> + '_> {
+        Box::new(self.factors.rows().map(|(_, row)| row))
+    }
 }
 
 /// F between the keys of a grouping, row by row.
@@ -78,6 +77,8 @@ pub(crate) struct Factors<'a> {
     /// Area of each key.
     areas: Vec<f64>,
     count: usize,
+    /// Whether the mirror image of each entry is part of the matrix.
+    mirrored: bool,
     /// Rows made at a time.
     band: usize,
 }
@@ -97,6 +98,7 @@ impl<'a> Factors<'a> {
                 .map(|(area, hidden)| area + hidden)
                 .collect(),
             count,
+            mirrored: matrix.record().symmetric,
             band: (BAND_ENTRIES / count.max(1)).max(1),
         })
     }
@@ -135,7 +137,7 @@ impl<'a> Factors<'a> {
                 let (row, column) = (self.keys[i] as usize, self.keys[j] as usize);
                 add(row, column, s);
                 // The mirror image; an entry on the diagonal is its own.
-                if i != j {
+                if self.mirrored && i != j {
                     add(column, row, s);
                 }
             });
@@ -162,7 +164,7 @@ mod tests {
         let table = |band: usize| -> Vec<(usize, Vec<f64>)> {
             let views = views(&blocks, Values::F64(&values), &[]).collect();
             let areas = vec![1.0, 2.0, 4.0, 0.0];
-            Factors { views, keys: &keys, areas, count: 4, band }.rows().collect()
+            Factors { views, keys: &keys, areas, count: 4, mirrored: true, band }.rows().collect()
         };
         let whole = table(4);
         // S between key 0 (elements 1 and 4) and itself: S_11 + 2 S_14 + S_44 = 3 + 2 * 7 + 13.

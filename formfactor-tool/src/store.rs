@@ -157,6 +157,21 @@ impl Store {
         Ok(())
     }
 
+    /// Appends a block made elsewhere; without symmetry its entries count for their rows alone.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn append(&mut self, packed: &PackedBlock, symmetric: bool) -> interchange::Result<()> {
+        self.writer.push(packed)?;
+        let view = packed.view();
+        if symmetric {
+            block_sums::add(&mut self.sums, &view, &sums_of(&view));
+        } else {
+            view.for_each(|i, _, s| self.sums[i] += s);
+        }
+        Ok(())
+    }
+
     /// Keeps what is kept of a tile whose entries are written.
     pub fn note(&mut self, pair: &LeafPair, tile: &StoredTile) {
         self.absent_blocks += usize::from(tile.packed.is_none());

@@ -13,7 +13,7 @@ use room::{ADJACENT, OPPOSITE, Room, factor};
 
 fn exported(room: &Room, by: By, name: &str) -> Vec<u8> {
     let output = room.path(name);
-    export::run(&[&room.matrix], &room.mesh, by, &output).unwrap();
+    export::run(&[&room.matrix], &room.mesh, by, None, &output).unwrap();
     std::fs::read(output).unwrap()
 }
 
@@ -114,9 +114,9 @@ fn both_sides_of_a_face_are_summed() {
 fn a_foreign_mesh_and_an_unknown_ending_are_refused() {
     let room = Room::new([0.5; 3], 0.0);
     let refusal = |name: &str| {
-        export::run(&[&room.matrix], &room.mesh, By::Group, &room.path(name)).unwrap_err().to_string()
+        export::run(&[&room.matrix], &room.mesh, By::Group, None, &room.path(name)).unwrap_err().to_string()
     };
-    assert!(refusal("f.txt").contains(".csv or .npy or .mtx"));
+    assert!(refusal("f.txt").contains(".csv, .npy, .npz, .mtx, .rmx, .vf"));
     let mut mesh = room::mesh();
     mesh.vertices[0][0] = -0.5;
     mesh.write(&room.mesh, Provenance::new("test", "1")).unwrap();

@@ -123,9 +123,24 @@ fn name_of(path: &Path) -> String {
     path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// Writes what `fill` produces to `path`. On any error the old file is untouched.
+/// The name that stands for standard output; a file of this name is `./-`.
+pub const STDOUT: &str = "-";
+
+/// Whether an output is standard output.
+pub fn is_stdout(path: &Path) -> bool {
+    path == Path::new(STDOUT)
+}
+
+/// Writes what `fill` produces to `path`, or to standard output where that is [`STDOUT`]. On any error the old file is
+/// untouched.
 pub fn write(path: &Path, fill: impl FnOnce(&mut dyn WriteSeek) -> std::io::Result<()>) -> Result<Outcome> {
     let io = |e| Error::io(path, "write", e);
+    if is_stdout(path) {
+        let mut all = std::io::Cursor::new(Vec::new());
+        fill(&mut all).map_err(io)?;
+        crate::tool::print_bytes(all.get_ref()).map_err(io)?;
+        return Ok(Outcome::Written);
+    }
     let partial = Partial::create(path)?;
     let mut buffered = BufWriter::with_capacity(1 << 20, partial.handle()?);
     fill(&mut buffered).map_err(io)?;

@@ -8,6 +8,7 @@ mod block;
 mod check;
 mod packed;
 mod parts;
+mod row;
 mod values;
 mod writer;
 
@@ -20,6 +21,7 @@ use std::path::Path;
 
 pub use block::{Block, BlockKind, BlockView, views};
 pub use packed::PackedBlock;
+pub use row::RowEntry;
 pub use values::{Precision, Values};
 pub use writer::{MatrixWriter, write};
 

@@ -84,8 +84,11 @@ impl Report {
         name.into()
     }
 
-    /// Writes the report beside `output`.
+    /// Writes the report beside `output`; standard output has no place beside it.
     pub fn write_beside(&mut self, output: &Path) -> Result<()> {
+        if atomic_write::is_stdout(output) {
+            return Ok(());
+        }
         self.peak_memory_bytes = peak_memory_bytes();
         let path = Self::path_for(output);
         let mut text = serde_json::to_string_pretty(self)

@@ -66,6 +66,12 @@ pub fn read_materials(path: &Path) -> Result<(MaterialTable, Vec<String>)> {
     Ok((library.into_table(), warnings))
 }
 
+/// The text of a file; what is not UTF-8 is refused with its line.
+pub(crate) fn read_text(path: &Path) -> Result<String> {
+    let bytes = std::fs::read(path).map_err(|e| crate::Error::io(path, "read", e))?;
+    statement::decode(path, &bytes).map(str::to_owned)
+}
+
 impl Scene {
     /// Reads `path` (OBJ), the MTL files it names and `NAME.toml` beside it where that exists.
     /// Materials named in `two_sided` are two-sided besides those the toml lists.

@@ -11,15 +11,16 @@ pub enum TableFormat {
     Csv,
     /// numpy array.
     Npy,
-    /// MatrixMarket coordinates.
-    Mtx,
 }
 
 impl TableFormat {
-    /// The format that the name's ending asks for, out of those `allowed`.
+    /// The format that the name's ending asks for, out of those `allowed`; CSV for standard output.
     pub fn of(path: &Path, allowed: &[TableFormat]) -> Result<Self> {
+        if atomic_write::is_stdout(path) {
+            return Ok(TableFormat::Csv);
+        }
         let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
-        let format = [("csv", TableFormat::Csv), ("npy", TableFormat::Npy), ("mtx", TableFormat::Mtx)];
+        let format = [("csv", TableFormat::Csv), ("npy", TableFormat::Npy)];
         let name = |wanted: &TableFormat| format.iter().find(|(_, f)| f == wanted).map_or("", |(n, _)| *n);
         let found = format.iter().find(|(n, f)| *n == ending && allowed.contains(f)).map(|(_, f)| *f);
         found.ok_or_else(|| {

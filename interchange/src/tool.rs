@@ -2,6 +2,8 @@
 //!
 //! Exit codes: 0 done; 1 failed; 2 bad usage (clap's); 3 finished and written, but the asked tolerance was not reached.
 
+pub mod pages;
+
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::fmt::Display;
 use std::io::IsTerminal;
@@ -11,6 +13,12 @@ use std::process::ExitCode;
 pub const EXIT_CODES: &str =
     "Exit codes: 0 done, 1 failed, 2 bad usage, 3 written, but the asked tolerance was not reached.";
 
+/// What `--help` says at its end: lines to try, and the exit codes.
+pub fn examples(lines: &[&str]) -> String {
+    let lines: String = lines.iter().map(|line| format!("  {line}\n")).collect();
+    format!("Examples:\n{lines}\n{EXIT_CODES}")
+}
+
 /// Value of a flag that is a finite number above 0.
 ///
 /// # Errors
@@ -18,6 +26,15 @@ pub const EXIT_CODES: &str =
 pub fn positive(text: &str) -> Result<f64, String> {
     let number = text.trim().parse().ok().filter(|&number: &f64| number.is_finite() && number > 0.0);
     number.ok_or_else(|| "expected a number above 0".into())
+}
+
+/// Value of a flag that is a finite number of at least 0, such as `--max`.
+///
+/// # Errors
+/// What was expected, for clap, which names the flag and what was given.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse().ok().filter(|&number: &f64| number.is_finite() && number >= 0.0);
+    number.ok_or_else(|| "expected a number of at least 0".into())
 }
 
 /// Flags every subcommand takes. None of them changes an output.
@@ -87,8 +104,13 @@ pub fn exit_code<E: Display>(tool: &str, result: Result<Finish, E>) -> ExitCode 
 
 /// Prints data on stdout; a reader that has gone away (`| head`) is no failure.
 pub fn print_data(text: &str) -> std::io::Result<()> {
+    print_bytes(text.as_bytes())
+}
+
+/// The same for data that need not be text.
+pub fn print_bytes(bytes: &[u8]) -> std::io::Result<()> {
     use std::io::Write;
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
+    match std::io::stdout().lock().write_all(bytes) {
         Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         other => other,
     }

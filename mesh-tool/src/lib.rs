@@ -10,7 +10,8 @@
 //!   or where a solution is worst ([`solved`]); [`conform`] makes planes meet.
 //!
 //! [`assemble`] leaves out what has no area ([`flat`]), numbers elements ([`cluster`]) and nodes ([`nodes`]); [`quality`]
-//! measures them; [`info`] and [`picture`] show the result.
+//! measures them; [`info`], [`look`] and [`picture`] show the result, [`mod@compare`] sets two beside each other, [`export`] hands
+//! one to other programs.
 //!
 //! # Limitations
 //! With a number of elements as budget, shape yields to it: faces much narrower than the elements get narrow ones. Two
@@ -25,6 +26,7 @@ pub mod box_tree;
 pub mod build;
 pub mod clean;
 pub mod cluster;
+pub mod compare;
 pub mod conform;
 pub mod contact;
 pub mod convex;
@@ -32,6 +34,7 @@ pub mod depfile;
 pub mod discontinuity;
 pub mod duplicates;
 pub mod eee;
+pub mod export;
 pub mod features;
 pub mod flat;
 pub mod frame;
@@ -40,6 +43,7 @@ pub mod hidden;
 pub mod info;
 pub mod light;
 pub mod lit;
+pub mod look;
 pub mod merge_lines;
 pub mod meshed;
 pub mod nodes;

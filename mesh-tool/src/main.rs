@@ -1,6 +1,6 @@
 //! Command line of mesh-tool.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use interchange::atomic_write;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
@@ -8,15 +8,25 @@ use interchange::scene::Scene;
 use interchange::tool::{self, Common, Finish};
 use mesh_tool::adaptive::INTERPOLATION_ERROR;
 use mesh_tool::discontinuity::Order;
+use mesh_tool::look::{self, Look};
 use mesh_tool::solved::Solved;
 use mesh_tool::steps::{Off, Skip, Step};
-use mesh_tool::{NAME, Options, VERSION, depfile, info, picture};
+use mesh_tool::{NAME, Options, VERSION, compare, depfile, export, info, picture};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+/// Lines to try, in `--help` and the manual page.
+const EXAMPLES: [&str; 5] = [
+    "mesh-tool build tests/scenes/cornell_blocks.obj -o box.mesh --elements 300",
+    "mesh-tool info box.mesh",
+    "mesh-tool picture box.mesh -o box.svg",
+    "mesh-tool export box.mesh -o box.glb",
+    "mesh-tool import box.vs3 -o from_view3d.obj",
+];
+
 /// Turns a scene into elements
 #[derive(Debug, Parser)]
-#[command(name = "mesh-tool", version, about, after_help = tool::EXIT_CODES)]
+#[command(name = "mesh-tool", version, about, after_help = tool::EXIT_CODES, after_long_help = tool::examples(&EXAMPLES))]
 struct CommandLine {
     #[command(subcommand)]
     command: Command,
@@ -62,6 +72,41 @@ enum Command {
         #[arg(long, value_name = "N")]
         plane: Option<usize>,
     },
+    /// Write the elements for other programs: .ply, .vtu, .glb, .obj, .rad (Radiance) or .vs3 (View3D)
+    Export {
+        /// Mesh (.mesh); colours are those of the .materials beside it
+        file: PathBuf,
+        /// File to write; its ending says the format
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
+    },
+    /// Turn a scene of View3D or Radiance into an OBJ with its MTL
+    Import {
+        /// Scene (.vs3 or .rad)
+        file: PathBuf,
+        /// OBJ to write; the MTL goes beside it
+        #[arg(short, long, value_name = "FILE")]
+        output: PathBuf,
+    },
+    /// Show by how much two meshes differ
+    Compare {
+        /// Mesh (.mesh)
+        first: PathBuf,
+        /// Mesh to compare it with
+        second: PathBuf,
+        /// As JSON, for scripts
+        #[arg(long)]
+        json: bool,
+        /// Fail (exit 1) where more than this part of the area is in elements that only one has
+        #[arg(long, value_name = "E", value_parser = tool::not_negative)]
+        max: Option<f64>,
+    },
+    /// Write manual pages and completions below a folder such as /usr/local
+    #[command(hide = true)]
+    Pages {
+        /// Folder
+        prefix: PathBuf,
+    },
     /// Say what is in a mesh or a material table
     Info {
         /// Mesh (.mesh) or material table (.materials)
@@ -69,6 +114,12 @@ enum Command {
         /// As JSON, for scripts
         #[arg(long)]
         json: bool,
+        /// Only element I, from 1, with its corners
+        #[arg(long, value_name = "I")]
+        element: Option<u32>,
+        /// Only this group
+        #[arg(long, value_name = "NAME", conflicts_with = "element")]
+        group: Option<String>,
     },
 }
 
@@ -195,8 +246,26 @@ fn run(line: &CommandLine) -> anyhow::Result<Finish> {
                 )));
             }
         }
+        Command::Pages { prefix } => tool::pages::write(CommandLine::command(), prefix)?,
         Command::Picture { file, output, plane } => picture::draw(file, output, *plane)?,
-        Command::Info { file, json } => tool::print_data(&info::describe(file, *json)?)?,
+        Command::Export { file, output } => export::write(file, output)?,
+        Command::Import { file, output } => {
+            for finding in export::convert(file, output)? {
+                tracing::warn!("{finding}");
+            }
+        }
+        Command::Compare { first, second, json, max } => {
+            let difference = compare::Difference::between(first, second)?;
+            tool::print_data(&difference.describe(*json))?;
+            difference.check(*max)?;
+        }
+        Command::Info { file, json, element, group } => {
+            let look = element.map(Look::Element).or(group.clone().map(Look::Group));
+            tool::print_data(&match look {
+                Some(look) => look::describe(file, &look, *json)?,
+                None => info::describe(file, *json)?,
+            })?;
+        }
     }
     Ok(Finish::Done)
 }

@@ -1,6 +1,7 @@
 //! Flags, and the three subcommands from files to files.
 
 use crate::camera::{Lens, Wishes};
+use crate::compare::Difference;
 use crate::error::Result;
 use crate::exr_file::{self, Fit, Label, Precision};
 use crate::facets::Drawn;
@@ -24,7 +25,7 @@ use interchange::atomic_write::refuse_input;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
 use interchange::scene::Settings;
-use interchange::tool::{Common, EXIT_CODES, Finish, positive, print_data};
+use interchange::tool::{Common, EXIT_CODES, Finish, examples, not_negative, pages, positive, print_data};
 use std::path::{Path, PathBuf};
 
 /// Largest picture side: 2^16 pixels, beyond any display or print.
@@ -32,9 +33,17 @@ const LARGEST_SIDE: u32 = 1 << 16;
 /// Largest picture: 2^28 pixels, 6 GB while it is made.
 const LARGEST_PICTURE: u64 = 1 << 28;
 
+/// Lines to try, in `--help` and the manual page.
+const EXAMPLES: [&str; 4] = [
+    "shade-tool render box.sol --mesh box.mesh -o box.exr --png box.png --camera tests/scenes/cornell_blocks.toml",
+    "shade-tool info box.exr",
+    "shade-tool compare box.exr box.exr --max 0",
+    "shade-tool probe box.sol --mesh box.mesh --points points.csv -o lit.csv",
+];
+
 /// Radiosity to pictures and points.
 #[derive(Debug, Parser)]
-#[command(name = TOOL, version, about, after_help = EXIT_CODES)]
+#[command(name = TOOL, version, about, after_help = EXIT_CODES, after_long_help = examples(&EXAMPLES))]
 pub struct Arguments {
     /// Flags of all tools.
     #[command(flatten)]
@@ -56,6 +65,14 @@ pub enum Command {
     View(Box<View>),
     /// Put pictures side by side with one exposure: a contact sheet
     Sheet(SheetArguments),
+    /// Show by how much two pictures differ
+    Compare(CompareArguments),
+    /// Write manual pages and completions below a folder such as /usr/local
+    #[command(hide = true)]
+    Pages {
+        /// Folder
+        prefix: PathBuf,
+    },
     /// Tell what a picture holds
     Info(InfoArguments),
 }
@@ -219,6 +236,21 @@ pub struct ProbeArguments {
     pub output: PathBuf,
 }
 
+/// Flags of `compare`.
+#[derive(Debug, Args)]
+pub struct CompareArguments {
+    /// Picture (.exr or .png)
+    pub first: PathBuf,
+    /// Picture to compare it with, of the same kind and size
+    pub second: PathBuf,
+    /// Tell it as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Fail (exit 1) where a channel's RMS difference is above this part of its mean
+    #[arg(long, value_name = "E", value_parser = not_negative)]
+    pub max: Option<f64>,
+}
+
 /// Flags of `info`.
 #[derive(Debug, Args)]
 pub struct InfoArguments {
@@ -241,7 +273,7 @@ impl Arguments {
             Command::Sheet(sheet) => {
                 return sheet.usage().or_else(|message| bad(ErrorKind::WrongNumberOfValues, message));
             }
-            Command::Probe(_) | Command::Info(_) => return Ok(()),
+            Command::Probe(_) | Command::Compare(_) | Command::Pages { .. } | Command::Info(_) => return Ok(()),
         };
         if render.tone.given() && render.png.is_none() {
             let message = "--exposure and --curve are for the preview: give --png";
@@ -278,6 +310,8 @@ impl Arguments {
             Command::Probe(arguments) => run_probe(arguments, &self.common)?,
             Command::View(view) => view.run()?,
             Command::Sheet(arguments) => arguments.run()?,
+            Command::Compare(arguments) => run_compare(arguments)?,
+            Command::Pages { prefix } => pages::write(Arguments::command(), prefix)?,
             Command::Info(arguments) => run_info(arguments)?,
         }
         Ok(Finish::Done)
@@ -443,6 +477,23 @@ fn run_probe(arguments: &ProbeArguments, common: &Common) -> Result<()> {
     Ok(())
 }
 
+fn run_compare(arguments: &CompareArguments) -> Result<()> {
+    let difference = Difference::between(&arguments.first, &arguments.second)?;
+    let text = if arguments.json { format!("{:#}\n", difference.json()) } else { difference.text() };
+    print_data(&text).map_err(|e| interchange::Error::io(Path::new("stdout"), "write", e))?;
+    let found = difference.relative();
+    match arguments.max {
+        Some(most) if found > most => {
+            let message = format!(
+                "differs from {} by {found:.3e} of the mean, above --max {most:e}",
+                arguments.first.display()
+            );
+            Err(interchange::Error::whole(&arguments.second, message).into())
+        }
+        _ => Ok(()),
+    }
+}
+
 fn run_info(arguments: &InfoArguments) -> Result<()> {
     let info = info::read(&arguments.file)?;
     let text = if arguments.json { format!("{:#}\n", info.json()) } else { info.text() };
@@ -496,11 +547,6 @@ fn ends_in_either(endings: [&'static str; 2]) -> impl Fn(&str) -> Result<PathBuf
         let fits = endings.iter().find_map(|ending| ends_in(ending)(text).ok());
         fits.ok_or_else(|| format!("the name must end in .{} or .{}", endings[0], endings[1]))
     }
-}
-
-fn not_negative(text: &str) -> Result<f64, String> {
-    let [x] = numbers(text)?;
-    if x >= 0.0 { Ok(x) } else { Err("expected a number of at least 0".into()) }
 }
 
 /// So many finite numbers with commas.

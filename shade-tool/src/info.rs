@@ -84,7 +84,7 @@ pub fn read(path: &Path) -> Result<PictureInfo> {
     Ok(PictureInfo { layers: layers.collect(), attributes })
 }
 
-/// Refuses what is not OpenEXR, with the name of the tool that shows it.
+/// Refuses what is no OpenEXR picture; a file of another stage by the name of the tool that shows it.
 pub fn check_kind(path: &Path) -> Result<()> {
     let mut file = std::fs::File::open(path).map_err(|e| interchange::Error::io(path, "open", e))?;
     let mut first = [0; 4];

@@ -26,6 +26,7 @@ pub mod canvas;
 pub mod coarser;
 pub mod colour_scale;
 pub mod command_line;
+pub mod compare;
 pub mod contours;
 pub mod convex;
 pub mod cook_torrance;

@@ -218,7 +218,7 @@ fn bad_usage_ends_with_2() {
     }
     for line in [
         "",
-        "compare a.exr b.exr",
+        "compare a.exr",
         "render s.sol -o s.exr",
         "probe s.sol --mesh s.mesh -o o.csv",
         "render s.sol --mesh s.mesh -o s.png",

@@ -3,7 +3,7 @@
 //! [`mod@solve`] takes the scene apart and has each part solved by a [`mod@method`] until a proved [`bound`] on the error
 //! meets the tolerance; [`mod@bounces`] sums bounces instead. [`error_budget`] says what errors of the matrix add to that,
 //! [`bounds`] encloses every radiosity and says who causes the error, and [`energy`] where the power went. [`thermal`]
-//! makes heat of it. [`run`], [`export`] and [`info`] are the program's subcommands.
+//! makes heat of it. [`run`], [`export`] (tables), [`surface`] (geometry), [`mod@compare`] and [`info`] are the program's subcommands.
 //!
 //! Two parallel plates that see nothing but each other, rho = 1/2, one of them glowing:
 //!
@@ -31,6 +31,7 @@ pub mod bounces;
 pub mod bound;
 pub mod bounds;
 pub mod channels;
+pub mod compare;
 pub mod components;
 pub mod discretisation;
 pub mod energy;
@@ -41,6 +42,7 @@ pub mod export;
 pub mod info;
 pub mod interval;
 mod kernel;
+pub mod look;
 pub mod lossless;
 pub mod method;
 mod part;
@@ -50,6 +52,7 @@ pub mod skips;
 pub mod snapshot;
 pub mod solve;
 pub mod start;
+pub mod surface;
 pub mod system;
 pub mod thermal;
 mod weighted;

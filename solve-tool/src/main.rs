@@ -1,10 +1,16 @@
 //! Command line of solve-tool.
 
+use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
+use interchange::foreign::Format;
 use interchange::grouping::By;
-use interchange::tool::{Common, EXIT_CODES, Finish, exit_code, positive, print_data};
+use interchange::tool::{
+    Common, EXIT_CODES, Finish, examples, exit_code, not_negative, pages, positive, print_data,
+};
+use solve_tool::compare::{Difference, Request};
 use solve_tool::export::{ExportRequest, Quantity, Units};
 use solve_tool::interval::Spread;
+use solve_tool::look::Look;
 use solve_tool::run::SolveRequest;
 use solve_tool::skips::{Skip, Skips};
 use solve_tool::snapshot::Plan;
@@ -12,9 +18,18 @@ use solve_tool::solve::Solver;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+/// Lines to try, in `--help` and the manual page.
+const EXAMPLES: [&str; 5] = [
+    "solve-tool solve box.ff --mesh box.mesh -o box.sol --tolerance 1e-3",
+    "solve-tool info box.sol",
+    "solve-tool export box.sol --mesh box.mesh --by group -o groups.csv",
+    "solve-tool export box.sol --mesh box.mesh -o box.vtu",
+    "solve-tool compare box.sol bounce.sol --mesh box.mesh",
+];
+
 /// Radiosity from an exchange matrix and materials.
 #[derive(Debug, Parser)]
-#[command(version, arg_required_else_help = true, after_help = EXIT_CODES)]
+#[command(name = "solve-tool", version, arg_required_else_help = true, after_help = EXIT_CODES, after_long_help = examples(&EXAMPLES))]
 struct Cli {
     #[command(flatten)]
     common: Common,
@@ -72,16 +87,18 @@ enum Command {
         #[arg(long, value_name = "E", default_value = "1e-6", value_parser = positive)]
         tolerance: f64,
     },
-    /// Write a table: radiosity and irradiance, energy, bounds, errors or heat
+    /// Write a table (radiosity and irradiance, energy, bounds, errors or heat), or the elements with all of it
+    ///
+    /// Elements go to viewers and other programs as .ply, .vtu (VTK), .glb (glTF), .obj or .rad (Radiance).
     Export {
         /// Solution (.sol)
         solution: PathBuf,
         /// The mesh it was computed on
         #[arg(long, value_name = "MESH")]
         mesh: PathBuf,
-        /// What a row stands for
+        /// What a row of the table stands for
         #[arg(long, value_enum)]
-        by: By,
+        by: Option<By>,
         /// What it tells
         #[arg(long, value_enum, default_value_t = Quantity::Radiosity)]
         quantity: Quantity,
@@ -91,9 +108,40 @@ enum Command {
         /// Luminous efficacy of the light for photometric units, lm/W (179: equal-energy white light)
         #[arg(long, value_name = "LM_PER_W", default_value = "179", value_parser = positive)]
         efficacy: f64,
-        /// Table to write (.csv or .npy)
-        #[arg(long, short, value_name = "TABLE")]
+        /// With elements: radiance that shows as white, W m^-2 sr^-1 [default: what 98 % of the area stays below]
+        #[arg(long, value_name = "L", value_parser = positive)]
+        white: Option<f64>,
+        /// Table (.csv or .npy) or elements (.ply, .vtu, .glb, .obj or .rad) to write
+        #[arg(long, short, value_name = "FILE")]
         output: PathBuf,
+    },
+    /// Show by how much two solutions differ
+    Compare {
+        /// Solution (.sol)
+        first: PathBuf,
+        /// Solution to compare it with
+        second: PathBuf,
+        /// Mesh of the first, and of the second unless that has its own
+        #[arg(long, value_name = "MESH")]
+        mesh: PathBuf,
+        /// Mesh of the second, where it is another one
+        #[arg(long, value_name = "MESH")]
+        second_mesh: Option<PathBuf>,
+        /// What is compared: means over it [default: element on one mesh, group on two]
+        #[arg(long, value_enum)]
+        by: Option<By>,
+        /// The same as JSON
+        #[arg(long)]
+        json: bool,
+        /// Fail (exit 1) where the radiosities differ by more than this part of all light
+        #[arg(long, value_name = "E", value_parser = not_negative)]
+        max: Option<f64>,
+    },
+    /// Write manual pages and completions below a folder such as /usr/local
+    #[command(hide = true)]
+    Pages {
+        /// Folder
+        prefix: PathBuf,
     },
     /// Describe a solution
     Info {
@@ -102,6 +150,15 @@ enum Command {
         /// For machines
         #[arg(long)]
         json: bool,
+        /// Only what it says of element I, from 1
+        #[arg(long, value_name = "I")]
+        element: Option<u32>,
+        /// Only what it says of a group: means, and sums of powers
+        #[arg(long, value_name = "NAME", requires = "mesh", conflicts_with = "element")]
+        group: Option<String>,
+        /// The mesh it was computed on, for areas and names
+        #[arg(long, value_name = "MESH")]
+        mesh: Option<PathBuf>,
     },
 }
 
@@ -109,6 +166,11 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     cli.common.start();
     exit_code("solve-tool", run(cli.command))
+}
+
+/// Ends the program as for any other bad usage.
+fn refuse(kind: ErrorKind, message: &str) -> ! {
+    Cli::command().error(kind, message).exit()
 }
 
 fn run(command: Command) -> anyhow::Result<Finish> {
@@ -130,8 +192,7 @@ fn run(command: Command) -> anyhow::Result<Finish> {
             tolerance,
         } => {
             if overshoot && solver != Solver::Southwell {
-                let message = "--overshoot goes with --solver southwell";
-                Cli::command().error(clap::error::ErrorKind::ArgumentConflict, message).exit();
+                refuse(ErrorKind::ArgumentConflict, "--overshoot goes with --solver southwell");
             }
             let request = SolveRequest {
                 matrix,
@@ -151,11 +212,42 @@ fn run(command: Command) -> anyhow::Result<Finish> {
             };
             return Ok(solve_tool::run::run(&request)?);
         }
-        Command::Export { solution, mesh, by, quantity, units, efficacy, output } => {
+        Command::Export { solution, mesh, by, quantity, units, efficacy, white, output } => {
+            if Format::of(&output).is_some() {
+                if by.is_some() || quantity != Quantity::Radiosity || units != Units::Radiometric {
+                    refuse(
+                        ErrorKind::ArgumentConflict,
+                        "--by, --quantity and --units go with tables (.csv, .npy)",
+                    );
+                }
+                solve_tool::surface::write(&solution, &mesh, white, &output)?;
+                return Ok(Finish::Done);
+            }
+            if white.is_some() {
+                refuse(
+                    ErrorKind::ArgumentConflict,
+                    "--white goes with elements (.ply, .vtu, .glb, .obj, .rad)",
+                );
+            }
+            let Some(by) = by else {
+                refuse(ErrorKind::MissingRequiredArgument, "a table needs --by element, face or group");
+            };
             let request = ExportRequest { solution, mesh, by, quantity, units, efficacy, output };
             solve_tool::export::run(&request)?;
         }
-        Command::Info { file, json } => print_data(&solve_tool::info::describe(&file, json)?)?,
+        Command::Compare { first, second, mesh, second_mesh, by, json, max } => {
+            let meshes = [mesh.clone(), second_mesh.unwrap_or(mesh)];
+            let difference = Difference::between(Request { solutions: [first, second], meshes, by })?;
+            print_data(&difference.describe(json))?;
+            difference.check(max)?;
+        }
+        Command::Pages { prefix } => pages::write(Cli::command(), &prefix)?,
+        Command::Info { file, json, element, group, mesh } => {
+            print_data(&match element.map(Look::Element).or(group.map(Look::Group)) {
+                Some(look) => solve_tool::look::describe(&file, mesh.as_deref(), &look, json)?,
+                None => solve_tool::info::describe(&file, json)?,
+            })?;
+        }
     }
     Ok(Finish::Done)
 }

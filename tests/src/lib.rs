@@ -6,6 +6,7 @@ pub mod cases;
 pub mod chain;
 pub mod close;
 pub mod damage;
+pub mod numpy;
 pub mod pipeline;
 pub mod programs;
 pub mod surfaces;

@@ -5,9 +5,9 @@ use std::process::Command;
 use tests::table::Table;
 use tests::{program, run};
 
-/// The indented lines of README.md that begin with a tool's name, or prepare a file for one.
-fn commands() -> Vec<String> {
-    let text = tests::text(&tests::root().join("README.md"));
+/// The indented lines of a page that begin with a tool's name, or prepare a file for one.
+fn commands(page: &str) -> Vec<String> {
+    let text = tests::text(&tests::root().join(page));
     let lines = text.lines().filter_map(|line| line.strip_prefix("    ")).map(str::to_owned);
     let starts = |line: &String| {
         tests::TOOLS.iter().chain(&["printf"]).any(|word| line.starts_with(&format!("{word} ")))
@@ -15,26 +15,39 @@ fn commands() -> Vec<String> {
     lines.filter(starts).collect()
 }
 
-#[test]
-fn the_walk_through_the_files_works() {
+/// Runs the commands of a page, one after another in one folder; data comes from those alone that tell something.
+fn walk(page: &str) -> (Vec<String>, tempfile::TempDir) {
     let folder = tests::folder();
     std::os::unix::fs::symlink(tests::root().join("tests"), folder.path().join("tests")).unwrap();
     let bin = program("mesh-tool").parent().unwrap().to_owned();
     let path = format!("{}:{}", bin.display(), std::env::var("PATH").unwrap_or_default());
-    let commands = commands();
+    let commands = commands(page);
+    for line in &commands {
+        let mut shell = Command::new("sh");
+        shell.args(["-c", line]).current_dir(folder.path()).env("PATH", &path);
+        let done = run(&mut shell);
+        assert!(done.code == Some(0), "{line}: exit {:?}: {}", done.code, done.stderr);
+        let told = [" info ", " compare ", " --dry-run", " --grid "].iter().any(|word| line.contains(word));
+        assert_eq!(done.stdout.is_empty(), !told, "{line}: {}", done.stdout);
+    }
+    (commands, folder)
+}
+
+#[test]
+fn every_line_of_inspecting_works() {
+    let (commands, folder) = walk("docs/inspecting.md");
+    assert!(commands.len() > 25, "{commands:?}");
+    assert!(folder.path().join("box.vtu").exists());
+}
+
+#[test]
+fn the_walk_through_the_files_works() {
+    let (commands, folder) = walk("README.md");
     for name in tests::TOOLS {
         assert!(
             commands.iter().any(|line| line.starts_with(&format!("{name} info "))),
             "no {name} info in README.md"
         );
-    }
-    for line in commands {
-        let mut shell = Command::new("sh");
-        shell.args(["-c", &line]).current_dir(folder.path()).env("PATH", &path);
-        let done = run(&mut shell);
-        assert!(done.code == Some(0), "{line}: exit {:?}: {}", done.code, done.stderr);
-        let told = [" info ", " --dry-run", " --grid "].iter().any(|word| line.contains(word));
-        assert_eq!(done.stdout.is_empty(), !told, "{line}: {}", done.stdout);
     }
 
     // What the text says of the tables.

@@ -1,0 +1,76 @@
+//! What people expect of any program: help with lines that work, manual pages, completions, tables on standard output.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use tests::chain::Chain;
+use tests::{TOOLS, run, tool};
+
+/// Every example in `--help` is a line of a page whose lines are run by a test.
+#[test]
+fn examples_of_the_help_are_lines_that_are_tested() {
+    let pages = ["README.md", "docs/inspecting.md"].map(|page| tests::text(&tests::root().join(page)));
+    for name in TOOLS {
+        let help = run(tool(name).arg("--help")).expect_code(0).stdout;
+        let (_, rest) =
+            help.split_once("Examples:\n").unwrap_or_else(|| panic!("{name}: no examples: {help}"));
+        let lines: Vec<&str> =
+            rest.lines().take_while(|line| line.starts_with("  ")).map(str::trim).collect();
+        assert!(lines.len() >= 4, "{name}: {lines:?}");
+        for line in lines {
+            let written =
+                pages.iter().any(|page| page.lines().any(|other| other.strip_prefix("    ") == Some(line)));
+            assert!(written, "{name}: no page has the line: {line}");
+        }
+    }
+}
+
+#[test]
+fn manual_pages_and_completions_know_every_subcommand() {
+    let folder = tests::folder();
+    for name in TOOLS {
+        run(tool(name).arg("pages").arg(folder.path())).expect_code(0);
+        let file = |path: String| tests::text(&folder.path().join("share").join(path));
+        let help = run(tool(name).arg("--help")).expect_code(0).stdout;
+        assert!(!help.contains("  pages"), "{help}");
+        let (_, commands) = help.split_once("Commands:\n").unwrap();
+        let commands = commands.lines().take_while(|line| !line.is_empty());
+        let commands: Vec<&str> = commands
+            .filter(|line| line.starts_with("  ") && !line.starts_with("   "))
+            .filter_map(|line| line.split_whitespace().next())
+            .filter(|word| *word != "help")
+            .collect();
+        assert!(commands.len() >= 4, "{commands:?}");
+        let page = file(format!("man/man1/{name}.1"));
+        assert!(page.contains("Examples:") && page.contains("Exit codes:"), "{page}");
+        for command in commands {
+            assert!(file(format!("man/man1/{name}-{command}.1")).contains(".TH"), "{name} {command}");
+            for completion in [
+                format!("bash-completion/completions/{name}"),
+                format!("zsh/site-functions/_{name}"),
+                format!("fish/vendor_completions.d/{name}.fish"),
+            ] {
+                assert!(file(completion.clone()).contains(command), "{completion} lacks {command}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_dash_is_standard_output() {
+    let folder = tests::folder();
+    let chain =
+        Chain::as_given(tests::scene("goral_cube.obj"), folder.path()).with_tolerances("1e-3", "1e-2");
+    chain.solve();
+    for (name, input) in [("formfactor-tool", "ff"), ("solve-tool", "sol")] {
+        let export = |output: &std::path::Path| {
+            let mut export = tool(name);
+            export.current_dir(folder.path()).arg("export").arg(chain.path(input)).arg("--mesh");
+            run(export.arg(chain.path("mesh")).args(["--by", "group", "-o"]).arg(output))
+                .expect_code(0)
+                .stdout
+        };
+        let file = folder.path().join("table.csv");
+        assert_eq!(export(&file), "");
+        assert_eq!(export("-".as_ref()), tests::text(&file));
+    }
+    assert!(!folder.path().join("-").exists());
+}
