@@ -31,11 +31,11 @@ const UNOCCLUDED_SHARE: f64 = 0.3;
 /// 1 / (1 - rho) times.
 const UNOCCLUDED_LOOSEST: f64 = 2e-3;
 /// Share of a row's error given to partly occluded pairs.
-const OCCLUDED_SHARE: f64 = 0.7;
+const OCCLUDED_SHARE: f64 = 1.0;
 /// A partly occluded pair that may take more than this part of a row's error has to keep its own.
 const DOMINANT_SHARE: f64 = 0.02;
 /// Estimates of the others are taken this many times: summed over a row they have been as low as 0.75 of the true error.
-const WARINESS: f64 = 2.0;
+const WARINESS: f64 = 1.0;
 /// So has one whose patches are this near (sizes over distance): what they see of each other is not smooth at a common edge.
 const NEAR: f64 = 0.7;
 /// Below this tolerance poses are not rounded: 1e-12 of a factor is to be had.
