@@ -24,7 +24,7 @@ const SMOOTH_MOST: f64 = 0.004;
 /// The same where the error must hold by itself, times s2 + s3: at most 0.024 was seen.
 const SMOOTH_ALONE: f64 = 0.05;
 /// Over cells within which the view changes its kind, times s2 + s3: sums overestimate 5 to 20 times.
-const BENT_ERROR: f64 = 0.03;
+const BENT_ERROR: f64 = 0.012;
 /// The same where the error must hold by itself: 0.137 was the most seen.
 const BENT_ALONE: f64 = 0.14;
 /// The distance of a rule of the first degree from the eight points, times s2 + s3.
@@ -215,7 +215,8 @@ impl Integral<'_, '_> {
     fn run(&mut self, whole: Cell, planes: &[ShadowPlane]) {
         let demanding = self.wanted.tolerance < UNSEEN * self.wanted.unblocked;
         if demanding && planes.len() <= CUT_AT_ONCE {
-            self.cut_fully(whole, planes, planes.len());
+            let all: Vec<usize> = (0..planes.len()).collect();
+            self.cut_fully(whole, planes, &all, planes.len());
         } else {
             self.add(whole);
         }
@@ -241,13 +242,15 @@ impl Integral<'_, '_> {
         self.error <= self.wanted.tolerance && self.doubt <= self.wanted.tolerance * self.wanted.tolerance
     }
 
-    /// Cuts a cell along every plane that crosses it and integrates over the parts. Each plane cuts once on the way to a
-    /// part, so `cuts_left` ends it also where a plane through nearly collinear places is too ill defined to have cut cleanly.
-    fn cut_fully(&mut self, cell: Cell, planes: &[ShadowPlane], cuts_left: usize) {
-        match self.best_cut(&cell, planes) {
+    /// Cuts a cell along every one of the `candidates` (places in `planes`) that crosses it and integrates over the parts. Each
+    /// plane cuts once on the way to a part, so `cuts_left` ends it also where a plane through nearly collinear places is too
+    /// ill defined to have cut cleanly.
+    fn cut_fully(&mut self, cell: Cell, planes: &[ShadowPlane], candidates: &[usize], cuts_left: usize) {
+        let mut crossing = Vec::new();
+        match self.best_cut(&cell, planes, candidates, &mut crossing) {
             Some(plane) if cuts_left > 0 => {
                 for part in self.split(&cell, |p| plane.height(p)).into_iter().flatten() {
-                    self.cut_fully(part, planes, cuts_left - 1);
+                    self.cut_fully(part, planes, &crossing, cuts_left - 1);
                 }
             }
             left => self.add(Cell { crossed: left.is_some(), ..cell }),
@@ -256,7 +259,8 @@ impl Integral<'_, '_> {
 
     fn improve(&mut self, cell: Cell, planes: &[ShadowPlane]) {
         if cell.crossed {
-            match self.best_cut(&cell, planes) {
+            let all: Vec<usize> = (0..planes.len()).collect();
+            match self.best_cut(&cell, planes, &all, &mut Vec::new()) {
                 Some(plane) => {
                     for part in self.split(&cell, |p| plane.height(p)).into_iter().flatten() {
                         self.add(part);
@@ -381,8 +385,14 @@ impl Integral<'_, '_> {
         self.keep(cell);
     }
 
-    /// The shadow plane that cuts the cell most evenly.
-    fn best_cut(&self, cell: &Cell, planes: &[ShadowPlane]) -> Option<ShadowPlane> {
+    /// The shadow plane among the `candidates` that cuts the cell most evenly; those that cut it are put into `crossing`.
+    fn best_cut(
+        &self,
+        cell: &Cell,
+        planes: &[ShadowPlane],
+        candidates: &[usize],
+        crossing: &mut Vec<usize>,
+    ) -> Option<ShadowPlane> {
         if cell.shadows.is_empty() {
             return None;
         }
@@ -390,12 +400,13 @@ impl Integral<'_, '_> {
         let tolerance = WORTHLESS_CUT * polygon::diameter(corners);
         let mut best = None;
         let mut best_balance = 0.0;
-        for plane in planes {
-            if let Some(balance) = plane.cut_balance(corners, tolerance)
-                && balance > best_balance
-            {
-                best_balance = balance;
-                best = Some(*plane);
+        for &at in candidates {
+            if let Some(balance) = planes[at].cut_balance(corners, tolerance) {
+                crossing.push(at);
+                if balance > best_balance {
+                    best_balance = balance;
+                    best = Some(planes[at]);
+                }
             }
         }
         best
