@@ -4,6 +4,7 @@
 //! factors, one to the partly occluded pairs, in proportion to their factors without blockers. How much those add up to
 //! in each row is found first, by looking at all pairs without computing any.
 
+use crate::cluster_rule::ClusterRule;
 use crate::counts::Counts;
 use crate::descent::{Findings, descend};
 use crate::estimator::{Estimator, TileBuilder};
@@ -30,6 +31,8 @@ const UNOCCLUDED_SHARE: f64 = 0.3;
 /// Unoccluded pairs are never asked less: they cost little, and in bright closed rooms what their rows miss of 1 counts
 /// 1 / (1 - rho) times.
 const UNOCCLUDED_LOOSEST: f64 = 2e-3;
+/// A single one of them may err by this many times more: the row counts.
+const MOST_RELATIVE: f64 = 10.0;
 /// Share of a row's error given to partly occluded pairs.
 const OCCLUDED_SHARE: f64 = 1.0;
 /// A partly occluded pair that may take more than this part of a row's error has to keep its own.
@@ -55,6 +58,7 @@ pub struct Exact<'a> {
     /// Per row: error of a partly occluded factor, relative to the factor without blockers.
     occluded: Vec<f64>,
     far: Far,
+    clusters: Option<ClusterRule>,
     /// Near pairs by their pose, where the tolerance leaves room for a pose's rounding.
     poses: Option<Poses>,
 }
@@ -73,14 +77,22 @@ impl<'a> Exact<'a> {
         let occluded = sizes.iter().map(|&size| OCCLUDED_SHARE * tolerance / size.max(tolerance)).collect();
         let unoccluded = (UNOCCLUDED_SHARE * tolerance).min(UNOCCLUDED_LOOSEST);
         let far = Far { low: FarPatches::low(&scene.patches), middle: FarPatches::middle(&scene.patches) };
+        let clusters = ClusterRule::new(scene, unoccluded);
         let poses =
             (tolerance >= POSE_TOLERANCE).then(|| Poses::new(unoccluded, skips.has(Skip::EqualPoses)));
-        Self { scene, skips, tolerance, unoccluded, occluded, far, poses }
+        Self { scene, skips, tolerance, unoccluded, occluded, far, clusters, poses }
     }
 
     fn one_way(&self, pair: &LeafPair) -> Tile {
         let builder = TileBuilder::zeros(pair);
-        let mut filling = Filling { exact: self, pair, builder, pending: Vec::new(), too_near: Vec::new() };
+        let mut filling = Filling {
+            exact: self,
+            pair,
+            builder,
+            pending: Vec::new(),
+            too_near: Vec::new(),
+            values: Vec::new(),
+        };
         let mut counts = Counts::default();
         descend(self.scene, self.skips, pair, &mut filling, &mut counts, &mut Scratch::default());
         *filling.builder.counts() = counts;
@@ -143,6 +155,7 @@ struct Filling<'e> {
     builder: TileBuilder,
     pending: Vec<u32>,
     too_near: Vec<u32>,
+    values: Vec<f64>,
 }
 
 impl Filling<'_> {
@@ -150,6 +163,56 @@ impl Filling<'_> {
         let (row, column) = (i - self.pair.rows.start, j - self.pair.columns.start);
         // Far pairs whose points lie on each other's planes sum up to rounding of either sign.
         self.builder.set(row, column, found.value.max(0.0), found.error);
+    }
+
+    /// Clusters wholly in front of each other: together where they are far enough apart, else the parts of the larger one,
+    /// down to single rows.
+    fn in_front(&mut self, first: &Cluster, second: &Cluster, counts: &mut Counts) {
+        let (rows, columns) = (first.range.clone(), second.range.clone());
+        let scene = self.exact.scene;
+        if let Some(rule) = &self.exact.clusters {
+            let mut values = std::mem::take(&mut self.values);
+            let found = rule.block(scene, (first, second), &mut values);
+            if let Some(error) = found {
+                self.set_block((rows.clone(), columns.clone()), &values, error, counts);
+            }
+            self.values = values;
+            if found.is_some() {
+                return;
+            }
+            let split = |cluster: &Cluster| cluster.children.map(|pair| pair.map(|c| &scene.clusters[c]));
+            let larger = if first.radius >= second.radius { first } else { second };
+            if let Some(parts) = split(larger).filter(|_| rule.is_worth_splitting(first, second)) {
+                for part in parts {
+                    let (p, q) = if first.radius >= second.radius { (part, second) } else { (first, part) };
+                    self.in_front(p, q, counts);
+                }
+                return;
+            }
+        }
+        rows.for_each(|i| self.row_in_front(i, columns.clone(), counts));
+    }
+
+    /// All pairs of two clusters, with one error per area of both patches; those to which it is too much are computed alone.
+    fn set_block(
+        &mut self,
+        (rows, columns): (Range<usize>, Range<usize>),
+        values: &[f64],
+        error: f64,
+        counts: &mut Counts,
+    ) {
+        let patches = &self.exact.scene.patches;
+        for (i, values) in rows.zip(values.chunks_exact(columns.len())) {
+            for (j, &value) in columns.clone().zip(values) {
+                let error = error * patches[i].area * patches[j].area;
+                if error <= MOST_RELATIVE * self.exact.unoccluded * value {
+                    counts.by_clusters += 1;
+                    self.set(i, j, Exchange { value, error });
+                } else {
+                    self.row_in_front(i, j..j + 1, counts);
+                }
+            }
+        }
     }
 
     /// A row of pairs that see each other wholly: far ones together, those that are too near for a rule by the next one.
@@ -162,7 +225,7 @@ impl Filling<'_> {
         let far = &self.exact.far;
         for (patches, served) in [(&far.low, Rule::Low), (&far.middle, Rule::Middle)] {
             too_near.clear();
-            patches.factors(i, &pending, |at, value, error| {
+            patches.factors(i, &pending, relative, |at, value, error| {
                 if error <= relative * value {
                     counts.add_unoccluded(served);
                     self.set(i, pending[at] as usize, Exchange { value, error });
@@ -185,16 +248,12 @@ impl Filling<'_> {
 
 impl Findings for Filling<'_> {
     fn clear(&mut self, first: &Cluster, second: &Cluster, counts: &mut Counts) {
-        let (rows, columns) = (first.range.clone(), second.range.clone());
         if first.faces(second) && second.faces(first) && self.exact.skips.has(Skip::FarRules) {
-            for i in rows {
-                self.row_in_front(i, columns.clone(), counts);
-            }
-            return;
+            return self.in_front(first, second, counts);
         }
         let patches = &self.exact.scene.patches;
-        for i in rows {
-            for j in columns.clone() {
+        for i in first.range.clone() {
+            for j in second.range.clone() {
                 match facing(&patches[i], &patches[j]) {
                     Facing::Away => counts.behind += 1,
                     Facing::Full if self.exact.skips.has(Skip::FarRules) => {

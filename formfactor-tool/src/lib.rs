@@ -11,6 +11,7 @@ pub mod area_form;
 pub mod block_sums;
 pub mod classical;
 pub mod closure;
+pub mod cluster_rule;
 pub mod compare;
 pub mod compute;
 pub mod counts;

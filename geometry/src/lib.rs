@@ -5,6 +5,7 @@
 
 pub mod area_rule;
 pub mod body;
+pub mod cluster_kernel;
 pub mod contour;
 pub mod edge_pair;
 pub mod far;

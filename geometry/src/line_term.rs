@@ -48,8 +48,7 @@ impl LineTerm {
     pub fn part(&self, s: &Lane, t: &Lane) -> Lane {
         let t = lanes(|k| if t[k] > s[k] { t[k] } else { s[k] });
         let width = lanes(|k| t[k] - s[k]);
-        let dot =
-            lanes(|k| self.start[k] + (s[k] + t[k]) * self.mixed[k] + s[k] * t[k] * self.length[k]);
+        let dot = lanes(|k| self.start[k] + (s[k] + t[k]) * self.mixed[k] + s[k] * t[k] * self.length[k]);
         let squared = lanes(|k| width[k] * width[k] * self.squared[k]);
         let angle = angles_over_sines(&squared, &dot);
         lanes(|k| angle[k] * width[k] * self.along[k])

@@ -423,7 +423,8 @@ impl Integral<'_, '_> {
         for places in points.places.chunks(LANES) {
             let group = std::array::from_fn(|k| places[k.min(places.len() - 1)]);
             let which = cell.shadows.clone();
-            match visible_factors(&group, self.normal, source, self.shadows, (which.clone(), from), together) {
+            match visible_factors(&group, self.normal, source, self.shadows, (which.clone(), from), together)
+            {
                 Some(found) => {
                     points.seen.extend_from_slice(&found.factors[..places.len()]);
                     is_of_one_kind &= found.kind.is_some() && (kind.is_none() || kind == found.kind);

@@ -68,9 +68,9 @@ pub fn shadow_planes(
         }
         let is_same = |known: &&mut ShadowPlane| {
             known.normal.cross(plane.normal).length_squared() < SAME_DIRECTION * SAME_DIRECTION
-                && receiver.iter().all(|&c| {
-                    (known.height(c).abs() - plane.height(c).abs()).abs() <= tolerance
-                })
+                && receiver
+                    .iter()
+                    .all(|&c| (known.height(c).abs() - plane.height(c).abs()).abs() <= tolerance)
         };
         match planes.iter_mut().find(is_same) {
             Some(known) => known.kind = Kind::Always,

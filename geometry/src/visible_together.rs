@@ -189,10 +189,7 @@ fn factors(
         let line = LineTerm::new(&cuts[p].exit, &cuts[p].entry, -normal);
         sum.add_visible(&line, MOST_CORNERS + cuts[p].border, &own, &mut hidden[..shadow_count]);
     }
-    Some(Seen {
-        factors: lanes(|k| (-sum.total[k] / TAU).max(0.0)),
-        kind: (!sum.mixed).then_some(sum.kind),
-    })
+    Some(Seen { factors: lanes(|k| (-sum.total[k] / TAU).max(0.0)), kind: (!sum.mixed).then_some(sum.kind) })
 }
 
 /// Lambert's sum on its way.
@@ -229,7 +226,8 @@ impl Sum {
         }
         let mut seen_to = own.start;
         for interval in &hidden[..number] {
-            let gap_end = lanes(|k| if interval.start[k] < own.end[k] { interval.start[k] } else { own.end[k] });
+            let gap_end =
+                lanes(|k| if interval.start[k] < own.end[k] { interval.start[k] } else { own.end[k] });
             self.add_part(line, place, &seen_to, &gap_end);
             let end = lanes(|k| if interval.end[k] > gap_end[k] { interval.end[k] } else { gap_end[k] });
             self.note(place, count(|k| end[k] > seen_to[k] + NO_PART));
@@ -392,7 +390,13 @@ impl Interval {
 /// run the same way one counts: in one shadow the later one is outside the other's half-space; of different shadows the
 /// later one is hidden and the earlier one is not.
 #[inline(always)]
-fn heights_on(cut: &Cut, chord: &Vectors, squares: &(Lane, Lane), other: &Cut, is_later: bool) -> (Lane, Lane) {
+fn heights_on(
+    cut: &Cut,
+    chord: &Vectors,
+    squares: &(Lane, Lane),
+    other: &Cut,
+    is_later: bool,
+) -> (Lane, Lane) {
     let (ha, hb) = (other.height(&cut.exit), other.height(&cut.entry));
     let sizes = other.normal.dot(&other.normal);
     let least = lanes(|k| COINCIDENT * COINCIDENT * sizes[k]);
@@ -476,8 +480,8 @@ mod tests {
             if everything {
                 continue;
             }
-            let points =
-                [0.05, 0.1, 0.3, 0.4, 0.6, 0.75, 0.9, 0.95].map(|t| receiver[0].lerp(receiver[1 + round % 3], t));
+            let points = [0.05, 0.1, 0.3, 0.4, 0.6, 0.75, 0.9, 0.95]
+                .map(|t| receiver[0].lerp(receiver[1 + round % 3], t));
             let which = (0..shadows.len(), From::First);
             let together =
                 visible_factors(&points, DVec3::Z, &source, &shadows, which.clone(), &mut Scratch::default());
