@@ -34,13 +34,13 @@ const UNOCCLUDED_LOOSEST: f64 = 2e-3;
 /// A single one of them may err by this many times more: the row counts.
 const MOST_RELATIVE: f64 = 10.0;
 /// Share of a row's error given to partly occluded pairs.
-const OCCLUDED_SHARE: f64 = 1.0;
+const OCCLUDED_SHARE: f64 = 0.7;
 /// A partly occluded pair that may take more than this part of a row's error has to keep its own.
 const DOMINANT_SHARE: f64 = 0.02;
-/// Estimates of the others are taken this many times: summed over a row they have been as low as 0.75 of the true error.
-const WARINESS: f64 = 1.0;
 /// So has one whose patches are this near (sizes over distance): what they see of each other is not smooth at a common edge.
 const NEAR: f64 = 0.7;
+/// All others may take this many times their share: most need less than a third of it.
+const OF_MANY: f64 = 1.2;
 /// Below this tolerance poses are not rounded: 1e-12 of a factor is to be had.
 const POSE_TOLERANCE: f64 = 1e-8;
 /// Most visible parts for one pair: a pair of whole walls behind a box needs some 10^5 for 12 digits.
@@ -292,11 +292,11 @@ impl Findings for Filling<'_> {
         let share = unblocked / p.area.min(q.area) * allowed[i].max(allowed[j]);
         let near = Separation::new(p, q).theta > NEAR;
         let alone = near || share > DOMINANT_SHARE * self.exact.tolerance;
+        let tolerance = if alone { tolerance } else { OF_MANY * tolerance };
         let wanted = Wanted { tolerance, unblocked, alone, most_evaluations: MOST_EVALUATIONS };
         let (found, effort) = pair.occluded(which, wanted, scratch);
         counts.add_occluded(effort);
-        let wariness = if alone { 1.0 } else { WARINESS };
-        self.set(i, j, Exchange { error: wariness * found.error, ..found });
+        self.set(i, j, found);
     }
 }
 

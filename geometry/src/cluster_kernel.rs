@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 /// Points a side that are tried, rising.
 pub const ORDERS: [usize; 6] = [3, 4, 5, 6, 7, 8];
 /// Largest error over the largest one at pairs of corners (test `the_estimate_covers_the_errors`).
-const CAUTION: f64 = 2.0;
+const CAUTION: f64 = 3.0;
 
 /// A set of coplanar patches prepared for one order.
 #[derive(Debug, Clone)]
@@ -144,7 +144,7 @@ impl Basis {
                 *value = cosines / (PI * squared * squared);
             }
         }
-        let mut error = 0.0f64;
+        let (mut error, mut touches) = (0.0f64, false);
         let mut of_other = vec![0.0; size];
         for (weights, &x) in self.at_corners.iter().zip(&self.corners) {
             of_other.fill(0.0);
@@ -155,11 +155,12 @@ impl Basis {
                 let got: f64 = weights.iter().zip(&of_other).map(|(w, v)| w * v).sum();
                 let distance = (got - kernel(x, n, y, m)).abs();
                 // Not a number where corners coincide.
-                error = if distance <= error { error } else { distance };
+                touches |= !distance.is_finite();
+                error = if distance > error { distance } else { error };
             }
         }
         let mean = values.iter().sum::<f64>() / values.len() as f64;
-        error.is_finite().then_some(Kernel { values, error: CAUTION * error, mean })
+        (!touches).then_some(Kernel { values, error: CAUTION * error, mean })
     }
 
     /// Exchange factors S_ij of all patches of this set with all of the other, row after row.
@@ -299,7 +300,7 @@ mod tests {
     fn the_estimate_covers_the_errors() {
         let state = &mut 5;
         let (mut tried, mut worst) = (0, [0.0f64; ORDERS.len()]);
-        while tried < 120 {
+        while tried < 400 {
             let mut vector = || DVec3::new(noise(state), noise(state), noise(state));
             let rectangle = |corner: DVec3, u: DVec3, v: DVec3| {
                 let across = (v - u * (u.dot(v) / u.length_squared())).normalize_or_zero();
@@ -337,7 +338,7 @@ mod tests {
                 }
             }
         }
-        assert!(worst.iter().all(|&w| w <= 1.0 && w > 0.1), "{worst:?}");
+        assert!(worst.iter().all(|&w| w <= 1.0 && w > 0.03), "{worst:?}");
     }
 
     #[test]

@@ -21,8 +21,11 @@ const RULES: [Rule; 3] = [Rule::Eight, Rule::Gauss(4), Rule::Gauss(8)];
 /// below; sums over many cells overestimate 25 to 40 times.
 const SMOOTH_ERROR: f64 = 0.012;
 const SMOOTH_MOST: f64 = 0.004;
-/// The same where the error must hold by itself, times s2 + s3: at most 0.024 was seen.
-const SMOOTH_ALONE: f64 = 0.05;
+/// The same where the error must hold by itself, times s2 + s3: as much as the distance from the first degree. At a border
+/// that both patches touch the variations see little of the singularity.
+const SMOOTH_ALONE: f64 = FIRST_DEGREE;
+/// Degrees 5 and 7 are near each other: where the error must hold by itself their distance counts this many times.
+const NEXT_DEGREE: f64 = 3.0;
 /// Over cells within which the view changes its kind, times s2 + s3: sums overestimate 5 to 20 times.
 const BENT_ERROR: f64 = 0.012;
 /// The same where the error must hold by itself: 0.137 was the most seen.
@@ -299,7 +302,8 @@ impl Integral<'_, '_> {
             let size = value.max(cell.value).max(f64::MIN_POSITIVE);
             let before = (cell.distance / size).min(1.0);
             let power = if cell.order == 1 { before.powi(4) } else { before.powi(2) * before.cbrt().powi(2) };
-            cell.doubt = distance.max(power * size);
+            let near = if cell.order == 1 { NEXT_DEGREE } else { 1.0 };
+            cell.doubt = (near * distance).max(power * size);
         }
         cell.is_rough |= decay > SLOW_DECAY;
         (cell.value, cell.distance) = (value, distance);
