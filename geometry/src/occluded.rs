@@ -379,8 +379,9 @@ impl Integral<'_, '_> {
             let decay = (varied.second / size).max((varied.third / size).sqrt());
             (SMOOTH_ERROR * varied.third * decay).min(SMOOTH_MOST * both)
         } else {
-            // Edges of different bodies that seem to cross are in no shadow plane. Higher orders do not help there.
-            cell.is_rough = true;
+            // Edges of different bodies that seem to cross are in no shadow plane. Higher orders help little there, but
+            // they tell where much less is to be feared.
+            cell.is_rough = !alone;
             if alone { BENT_ALONE * both } else { BENT_ERROR * both }
         };
         if alone {

@@ -31,15 +31,14 @@ enum Kind {
     BlockerCorner,
     /// Corner of one blocker, edge of another: they must line up before the source.
     Blockers,
-    /// The blocker's own plane, where its two sides change roles, or one plane with several of these meanings.
+    /// The blocker's own plane, where its two sides change roles.
     Always,
 }
 
 /// Among more shadows than these the planes of two blockers are too many to be worth their time.
 const MOST_TOGETHER: usize = 4;
-/// Two planes are one where their normals differ by at most this.
-const SAME_DIRECTION: f64 = 1e-9;
-
+/// Among more planes than these those of two blockers cut into too many cells for what they bend.
+const MOST_PLANES: usize = 16;
 /// The shadow planes of a source and the shadows `which` that cut `receiver` visibly.
 pub fn shadow_planes(
     receiver: &[DVec3],
@@ -51,7 +50,7 @@ pub fn shadow_planes(
 ) {
     planes.clear();
     let tolerance = WORTHLESS_CUT * polygon::diameter(receiver);
-    let mut push = |apex: DVec3, from: DVec3, to: DVec3, kind: Kind| {
+    let push = |planes: &mut Vec<ShadowPlane>, apex: DVec3, from: DVec3, to: DVec3, kind: Kind| {
         let normal = (from - apex).cross(to - apex);
         // Most planes pass the receiver by: that needs no unit normal.
         let is_above = |p: &DVec3| normal.dot(*p - apex) > 0.0;
@@ -66,45 +65,40 @@ pub fn shadow_planes(
         if kind == Kind::Blockers && plane.lines_up_beside(receiver, source) {
             return;
         }
-        let is_same = |known: &&mut ShadowPlane| {
-            known.normal.cross(plane.normal).length_squared() < SAME_DIRECTION * SAME_DIRECTION
-                && receiver
-                    .iter()
-                    .all(|&c| (known.height(c).abs() - plane.height(c).abs()).abs() <= tolerance)
-        };
-        match planes.iter_mut().find(is_same) {
-            Some(known) => known.kind = Kind::Always,
-            None => planes.push(plane),
-        }
+        planes.push(plane);
     };
     let mut vertices: Vec<DVec3> = Vec::new();
     let mut ends = Vec::new();
     for at in which.clone() {
         let first = vertices.len();
         shadows.for_each_edge(at, from, |edge| {
-            source.iter().for_each(|&corner| push(corner, edge.from, edge.to, Kind::SourceCorner));
+            source.iter().for_each(|&corner| push(planes, corner, edge.from, edge.to, Kind::SourceCorner));
             for end in [edge.from, edge.to] {
                 if !vertices[first..].contains(&end) {
                     vertices.push(end);
-                    polygon::edges(source).for_each(|(a, b)| push(end, a, b, Kind::BlockerCorner));
+                    polygon::edges(source).for_each(|(a, b)| push(planes, end, a, b, Kind::BlockerCorner));
                 }
             }
         });
         ends.push(vertices.len());
         shadows.for_each_crossed_face(at, from, |face| {
             let (x, y) = face.axes();
-            push(face.origin, face.origin + x, face.origin + y, Kind::Always);
+            push(planes, face.origin, face.origin + x, face.origin + y, Kind::Always);
         });
     }
-    if ends.len() > MOST_TOGETHER {
+    let of_source = planes.len();
+    if ends.len() > MOST_TOGETHER || of_source > MOST_PLANES {
         return;
     }
     for (k, at) in which.enumerate() {
         let own = if k == 0 { 0 } else { ends[k - 1] }..ends[k];
         shadows.for_each_edge(at, from, |edge| {
             let others = vertices.iter().enumerate().filter(|(place, _)| !own.contains(place));
-            others.for_each(|(_, &corner)| push(corner, edge.from, edge.to, Kind::Blockers));
+            others.for_each(|(_, &corner)| push(planes, corner, edge.from, edge.to, Kind::Blockers));
         });
+    }
+    if planes.len() > MOST_PLANES {
+        planes.truncate(of_source);
     }
 }
 
