@@ -18,7 +18,9 @@ pub mod counts;
 pub mod descent;
 pub mod estimator;
 pub mod exact;
+
 pub mod export;
+mod filling;
 pub mod hemicube;
 pub mod info;
 pub mod journal;
@@ -32,6 +34,7 @@ pub mod rows;
 pub mod scene;
 pub mod schedule;
 pub mod shards;
+mod sizes;
 pub mod skips;
 pub mod store;
 pub mod tile;

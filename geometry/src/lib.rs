@@ -5,12 +5,14 @@
 
 pub mod area_rule;
 pub mod body;
+mod border_sum;
 pub mod cluster_kernel;
 pub mod contour;
 pub mod edge_pair;
 pub mod far;
 pub mod gather;
 pub mod hemicube;
+mod interval;
 pub mod lanes;
 pub mod line_term;
 pub mod merge;

@@ -8,7 +8,9 @@
 //! # Precision
 //! Rounding of the terms, 1e-16 of a factor of 1. Of two chords on one line that bound the same side one counts.
 
-use crate::lanes::{LANES, Lane, Vectors, all, count, lanes};
+use crate::border_sum::Sum;
+use crate::interval::Interval;
+use crate::lanes::{LANES, Lane, Vectors, all, lanes};
 use crate::line_term::LineTerm;
 use crate::shadow::{Border, From, Shadows};
 use glam::DVec3;
@@ -23,10 +25,6 @@ const MOST_CUTS: usize = 16;
 const MOST_SHADOWS: usize = 4;
 /// A height this small, in units of the distances, is zero: chords on one line.
 const COINCIDENT: f64 = 1e-13;
-
-/// Parts of lines this short do not tell one kind of view from another: rounding makes them where a corner of the source
-/// lies on a shadow's border for all points.
-const NO_PART: f64 = 1e-9;
 
 /// What the points see.
 #[derive(Debug, Clone, Copy)]
@@ -192,68 +190,6 @@ fn factors(
     Some(Seen { factors: lanes(|k| (-sum.total[k] / TAU).max(0.0)), kind: (!sum.mixed).then_some(sum.kind) })
 }
 
-/// Lambert's sum on its way.
-#[derive(Default)]
-struct Sum {
-    total: Lane,
-    /// A digest of what its terms are.
-    kind: u64,
-    /// Whether that differs between lanes.
-    mixed: bool,
-}
-
-impl Sum {
-    /// Adds the parts of a line that lie in `own` and in none of the `hidden` intervals, which are put in order.
-    #[inline(always)]
-    fn add_visible(&mut self, line: &LineTerm, place: usize, own: &Interval, hidden: &mut [Interval]) {
-        if all(|k| own.end[k] <= own.start[k]) {
-            return self.note(place, 0);
-        }
-        let mut number = 0;
-        for at in 0..hidden.len() {
-            let interval = hidden[at];
-            if !all(|k| interval.end[k] <= interval.start[k]) {
-                hidden[number] = interval.or_beyond();
-                number += 1;
-            }
-        }
-        for last in (1..number).rev() {
-            for at in 0..last {
-                let (first, second) = hidden.split_at_mut(at + 1);
-                let swapped = Interval::sort(&mut first[at], &mut second[0]);
-                self.note(place, swapped);
-            }
-        }
-        let mut seen_to = own.start;
-        for interval in &hidden[..number] {
-            let gap_end =
-                lanes(|k| if interval.start[k] < own.end[k] { interval.start[k] } else { own.end[k] });
-            self.add_part(line, place, &seen_to, &gap_end);
-            let end = lanes(|k| if interval.end[k] > gap_end[k] { interval.end[k] } else { gap_end[k] });
-            self.note(place, count(|k| end[k] > seen_to[k] + NO_PART));
-            seen_to = lanes(|k| if end[k] > seen_to[k] { end[k] } else { seen_to[k] });
-        }
-        self.add_part(line, place, &seen_to, &own.end);
-    }
-
-    #[inline(always)]
-    fn add_part(&mut self, line: &LineTerm, place: usize, start: &Lane, end: &Lane) {
-        self.note(place, count(|k| end[k] > start[k] + NO_PART));
-        if !all(|k| end[k] <= start[k]) {
-            let term = line.part(start, end);
-            self.total = lanes(|k| self.total[k] + term[k]);
-        }
-    }
-
-    /// Takes down in how many lanes something holds at a place of the border.
-    #[inline(always)]
-    fn note(&mut self, place: usize, number: usize) {
-        self.mixed |= number != 0 && number != LANES;
-        let bits = (place as u64) << 1 | u64::from(number != 0);
-        self.kind = (self.kind ^ bits).wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(29);
-    }
-}
-
 impl Cut {
     #[inline(always)]
     fn height(&self, at: &Vectors) -> Lane {
@@ -329,61 +265,6 @@ enum Side {
     Inside,
     Outside,
     Across,
-}
-
-/// Part of a segment: parameters from 0 to 1; nothing where the end is not above the start.
-#[derive(Debug, Clone, Copy)]
-struct Interval {
-    start: Lane,
-    end: Lane,
-}
-
-impl Interval {
-    const WHOLE: Interval = Interval { start: [0.0; LANES], end: [1.0; LANES] };
-    const NOTHING: Interval = Interval { start: [2.0; LANES], end: [-1.0; LANES] };
-
-    /// Cuts it by heights over a half-space at 0 and at 1; where the height is zero in between.
-    #[inline(always)]
-    fn cut(&mut self, ha: &Lane, hb: &Lane) -> Lane {
-        let crossing = lanes(|k| ha[k] / (ha[k] - hb[k]));
-        let start = lanes(|k| {
-            let inside = if hb[k] < 0.0 { 2.0 } else { crossing[k] };
-            if ha[k] < 0.0 { inside } else { 0.0 }
-        });
-        let end = lanes(|k| {
-            let inside = if ha[k] < 0.0 { -1.0 } else { crossing[k] };
-            if hb[k] < 0.0 { inside } else { 1.0 }
-        });
-        self.start = lanes(|k| if start[k] > self.start[k] { start[k] } else { self.start[k] });
-        self.end = lanes(|k| if end[k] < self.end[k] { end[k] } else { self.end[k] });
-        crossing
-    }
-
-    /// Itself, and beyond all others in the lanes where it is nothing.
-    #[inline(always)]
-    fn or_beyond(&self) -> Interval {
-        let is_something = |k: usize| self.end[k] > self.start[k];
-        Interval {
-            start: lanes(|k| if is_something(k) { self.start[k] } else { 2.0 }),
-            end: lanes(|k| if is_something(k) { self.end[k] } else { -1.0 }),
-        }
-    }
-
-    /// Puts two intervals in the order of their starts; the number of lanes in which they were not.
-    #[inline(always)]
-    fn sort(first: &mut Interval, second: &mut Interval) -> usize {
-        let (a, b) = (*first, *second);
-        let swapped = |k: usize| b.start[k] < a.start[k];
-        *first = Interval {
-            start: lanes(|k| if swapped(k) { b.start[k] } else { a.start[k] }),
-            end: lanes(|k| if swapped(k) { b.end[k] } else { a.end[k] }),
-        };
-        *second = Interval {
-            start: lanes(|k| if swapped(k) { a.start[k] } else { b.start[k] }),
-            end: lanes(|k| if swapped(k) { a.end[k] } else { b.end[k] }),
-        };
-        count(|k| b.start[k] < a.start[k] - NO_PART)
-    }
 }
 
 /// Heights of a chord's ends over another half-space, zero where the chord lies on its border. Of two chords on one line that
