@@ -25,7 +25,7 @@ const SMOOTH_MOST: f64 = 0.004;
 /// that both patches touch the variations see little of the singularity.
 const SMOOTH_ALONE: f64 = FIRST_DEGREE;
 /// Degrees 5 and 7 are near each other: where the error must hold by itself their distance counts this many times.
-const NEXT_DEGREE: f64 = 3.0;
+const NEXT_DEGREE: f64 = 5.0;
 /// Over cells within which the view changes its kind, times s2 + s3: sums overestimate 5 to 20 times.
 const BENT_ERROR: f64 = 0.012;
 /// The same where the error must hold by itself: 0.137 was the most seen.
@@ -43,6 +43,8 @@ const SLOW_DECAY: f64 = 0.1;
 /// Where shadow lines cross a cell, its points may all miss what lies between them: that much of the unblocked
 /// factor is never ruled out.
 const UNSEEN: f64 = 0.02;
+/// Running sums that fell below this part of their largest value are added up anew.
+const STALE: f64 = 1e-6;
 /// Up to this many shadow planes the receiver is cut along all of them at once; where there are more, along those that
 /// matter.
 const CUT_AT_ONCE: usize = 16;
@@ -223,11 +225,14 @@ impl Integral<'_, '_> {
         } else {
             self.add(whole);
         }
+        let mut most = (0.0f64, 0.0f64);
         loop {
-            if self.is_met() {
-                // The running sums have rounding in them: only fresh ones count.
+            // The running sums have the rounding of their largest values in them: only fresh ones count.
+            (most.0, most.1) = (self.error.max(most.0), self.doubt.max(most.1));
+            if self.is_met() || self.error < STALE * most.0 || self.doubt < STALE * most.1 {
                 self.error = self.scratch.cells.iter().map(|c| c.error).sum();
                 self.doubt = self.scratch.cells.iter().map(|c| c.doubt * c.doubt).sum();
+                most = (self.error, self.doubt);
             }
             if self.is_met() || self.evaluations >= self.wanted.most_evaluations {
                 return;

@@ -37,6 +37,8 @@ enum Kind {
 
 /// Among more shadows than these the planes of two blockers are too many to be worth their time.
 const MOST_TOGETHER: usize = 4;
+/// Two planes through one point are one where their normals differ by at most this.
+const SAME_DIRECTION: f64 = 1e-9;
 /// Among more planes than these those of two blockers cut into too many cells for what they bend.
 const MOST_PLANES: usize = 16;
 /// The shadow planes of a source and the shadows `which` that cut `receiver` visibly.
@@ -62,8 +64,14 @@ pub fn shadow_planes(
         if plane.normal == DVec3::ZERO || plane.cut_balance(receiver, tolerance).is_none() {
             return;
         }
-        if kind == Kind::Blockers && plane.lines_up_beside(receiver, source) {
-            return;
+        if kind == Kind::Blockers {
+            let is_known = |known: &ShadowPlane| {
+                let turn = known.normal.cross(plane.normal).length_squared();
+                turn < SAME_DIRECTION * SAME_DIRECTION && known.height(apex).abs() <= tolerance
+            };
+            if plane.lines_up_beside(receiver, source) || planes.iter().any(is_known) {
+                return;
+            }
         }
         planes.push(plane);
     };
