@@ -18,6 +18,8 @@ pub struct Counts {
     pub empty_shaft: usize,
     /// Unoccluded, by rule: one point, few, several, many, contour.
     pub unoccluded: [usize; 5],
+    /// Unoccluded, together with all pairs of their clusters.
+    pub by_clusters: usize,
     /// Partly occluded.
     pub occluded: usize,
     /// Visible parts computed for them.
@@ -57,6 +59,7 @@ impl Counts {
         for (sum, n) in self.unoccluded.iter_mut().zip(other.unoccluded) {
             *sum += n;
         }
+        self.by_clusters += other.by_clusters;
         self.occluded += other.occluded;
         self.visible_parts += other.visible_parts;
         self.exhausted += other.exhausted;
@@ -73,6 +76,7 @@ impl Counts {
         for (name, number) in rules.iter().zip(self.unoccluded) {
             report.count(&format!("pairs unoccluded, {name}"), number);
         }
+        report.count("pairs unoccluded, by whole clusters", self.by_clusters);
         report.count("pairs partly occluded", self.occluded);
         report.count("pairs partly occluded, out of evaluations", self.exhausted);
         report.count("pairs computed from both sides", self.computed_twice);

@@ -37,6 +37,8 @@ pub struct Scene {
 /// A range of elements with what holds for all of them.
 #[derive(Debug)]
 pub struct Cluster {
+    /// Its place in the tree.
+    pub number: usize,
     /// Its elements.
     pub range: Range<usize>,
     /// Its children in the tree; none for a single element.
@@ -147,7 +149,11 @@ fn cluster_tree(mesh: &Mesh, patches: &[Patch]) -> Vec<Cluster> {
         }
         at += 1;
     }
-    nodes.into_par_iter().map(|n| Cluster::new(n.range, n.children, n.is_block, patches)).collect()
+    let cluster = |(number, node): (usize, Node)| Cluster {
+        number,
+        ..Cluster::new(node.range, node.children, node.is_block, patches)
+    };
+    nodes.into_par_iter().enumerate().map(cluster).collect()
 }
 
 impl Cluster {
@@ -155,7 +161,7 @@ impl Cluster {
         if range.len() == 1 {
             let patch = &patches[range.start];
             let (hull, radius) = (patch.corners.clone(), patch.radius);
-            return Cluster { range, children, is_block, hull, plane: Some(patch.plane), radius };
+            return Cluster { number: 0, range, children, is_block, hull, plane: Some(patch.plane), radius };
         }
         let corners = || range.clone().flat_map(|i| patches[i].corners.iter().copied());
         let first = patches[range.start].plane;
@@ -169,7 +175,7 @@ impl Cluster {
         };
         let middle = hull.iter().sum::<DVec3>() / hull.len() as f64;
         let radius = hull.iter().map(|&c| (c - middle).length()).fold(0.0, f64::max);
-        Cluster { range, children, is_block, hull, plane, radius }
+        Cluster { number: 0, range, children, is_block, hull, plane, radius }
     }
 
     /// It as a set of points.

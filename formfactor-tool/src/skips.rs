@@ -26,7 +26,7 @@ pub enum Skip {
     ZeroBlocks,
     /// Equal relative poses of unoccluded near pairs: computed once
     EqualPoses,
-    /// Well-separated pairs: cheaper rules than the contour
+    /// Well-separated pairs and clusters: cheaper rules than the contour, one interpolated kernel for all pairs of two clusters
     FarRules,
 }
 

@@ -3,6 +3,7 @@
 //! Gauss points on both, summed over the kernel cos cos / (pi r^2): the only rule that loses no digits far away (theory of
 //! its cancellation: all terms have one sign). Its error falls as a power of size over distance.
 
+use crate::lanes::{LANES, Lane, all, lanes};
 use crate::patch::Patch;
 use crate::polygon;
 use crate::quadrature::Strength;
@@ -10,8 +11,6 @@ use std::f64::consts::PI;
 
 /// Most points of a rule.
 const MOST_POINTS: usize = 9;
-/// Pairs computed together.
-const LANES: usize = 4;
 /// The error estimates hold up to this (R_i + R_j) / r: beyond, the higher orders are not small.
 const FAR: f64 = 0.35;
 
@@ -100,112 +99,119 @@ impl FarPatches {
     }
 
     /// Calls `visit(place, value, error)` for patch `i` with each of `columns` (place in the list): exchange factor and
-    /// estimate of its error, infinite where they are too near. Means nothing for pairs that are not wholly in front of each other.
-    pub fn factors(&self, i: usize, columns: &[u32], mut visit: impl FnMut(usize, f64, f64)) {
+    /// estimate of its error, infinite where they are too near for an error of `relative`. Means nothing for pairs that are
+    /// not wholly in front of each other.
+    pub fn factors(&self, i: usize, columns: &[u32], relative: f64, mut visit: impl FnMut(usize, f64, f64)) {
         for (group, indices) in columns.chunks(LANES).enumerate() {
-            let lanes: [usize; LANES] = std::array::from_fn(|k| indices[k.min(indices.len() - 1)] as usize);
-            let mut values = [0.0; LANES];
-            let mut errors = [0.0; LANES];
-            self.lanes(i, &lanes, &mut values, &mut errors);
+            let columns = std::array::from_fn(|k| indices[k.min(indices.len() - 1)] as usize);
+            let (values, errors) = self.together(i, &columns, relative);
             for k in 0..indices.len() {
                 visit(group * LANES + k, values[k], errors[k]);
             }
         }
     }
 
-    /// Fills four lanes, with the widest registers of the machine. The loops add up in a fixed order and fuse no operations:
-    /// the wide code gives the same bytes as the portable code.
-    #[allow(unsafe_code)] // a call of code for a feature that has just been found
-    fn lanes(
-        &self,
-        i: usize,
-        columns: &[usize; LANES],
-        values: &mut [f64; LANES],
-        errors: &mut [f64; LANES],
-    ) {
+    /// Values and errors of one group, with the widest registers of the machine. The loops add up in a fixed order and fuse no
+    /// operations: the wide code gives the same bytes as the portable code.
+    #[allow(unsafe_code)] // calls of code for features that have just been found
+    fn together(&self, i: usize, columns: &[usize; LANES], relative: f64) -> (Lane, Lane) {
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: the feature is there.
-            return unsafe { self.lanes_avx2(i, columns, values, errors) };
+        {
+            if is_x86_feature_detected!("avx512f") {
+                // SAFETY: the feature is there.
+                return unsafe { self.together_avx512(i, columns, relative) };
+            }
+            if is_x86_feature_detected!("avx2") {
+                // SAFETY: the feature is there.
+                return unsafe { self.together_avx2(i, columns, relative) };
+            }
         }
-        self.lanes_portable(i, columns, values, errors);
+        self.together_portable(i, columns, relative)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f")]
+    fn together_avx512(&self, i: usize, columns: &[usize; LANES], relative: f64) -> (Lane, Lane) {
+        self.together_portable(i, columns, relative)
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn lanes_avx2(
-        &self,
-        i: usize,
-        columns: &[usize; LANES],
-        values: &mut [f64; LANES],
-        errors: &mut [f64; LANES],
-    ) {
-        self.lanes_portable(i, columns, values, errors);
+    fn together_avx2(&self, i: usize, columns: &[usize; LANES], relative: f64) -> (Lane, Lane) {
+        self.together_portable(i, columns, relative)
     }
 
     #[inline(always)]
-    fn lanes_portable(
-        &self,
-        i: usize,
-        columns: &[usize; LANES],
-        values: &mut [f64; LANES],
-        errors: &mut [f64; LANES],
-    ) {
+    fn together_portable(&self, i: usize, columns: &[usize; LANES], relative: f64) -> (Lane, Lane) {
+        // Neighbours in the list are mostly neighbours in memory.
+        match (1..LANES).all(|k| columns[k] == columns[0] + k) {
+            true => self.sums(i, relative, |from| {
+                let from = &from[columns[0]..columns[0] + LANES];
+                lanes(|k| from[k])
+            }),
+            false => self.sums(i, relative, |from| lanes(|k| from[columns[k]])),
+        }
+    }
+
+    #[inline(always)]
+    fn sums(&self, i: usize, relative: f64, column: impl Fn(&[f64]) -> Lane) -> (Lane, Lane) {
         let own = |from: &[Vec<f64>; 3]| [from[0][i], from[1][i], from[2][i]];
-        let load = |from: &[Vec<f64>; 3]| {
-            [lane(&from[0], columns), lane(&from[1], columns), lane(&from[2], columns)]
-        };
+        let load = |from: &[Vec<f64>; 3]| [column(&from[0]), column(&from[1]), column(&from[2])];
         let (n, m) = (own(&self.normal), load(&self.normal));
         let (c, centre) = (own(&self.centre), load(&self.centre));
+
+        // The error needs no sum; nor does the most that the factor may be.
+        let (area, radius) = (column(&self.area), column(&self.radius));
+        let (moments, skew) = (column(&self.moments), column(&self.skew));
+        let (even, odd) = (self.decay.even, self.decay.odd);
+        let r = [0, 1, 2].map(|axis| lanes(|k| centre[axis][k] - c[axis]));
+        let inverse = lanes(|k| 1.0 / (r[0][k] * r[0][k] + r[1][k] * r[1][k] + r[2][k] * r[2][k]));
+        let root = lanes(|k| inverse[k].sqrt());
+        let theta = lanes(|k| (self.radius[i] + radius[k]) * root[k]);
+        let kernel = lanes(|k| {
+            let height_p = n[0] * r[0][k] + n[1] * r[1][k] + n[2] * r[2][k];
+            let height_q = m[0][k] * r[0][k] + m[1][k] * r[1][k] + m[2][k] * r[2][k];
+            let largest = |height: f64| (height.abs() * root[k] + theta[k]).min(1.0);
+            self.area[i] * area[k] * inverse[k] / PI * largest(height_p) * largest(height_q)
+        });
+        let errors = lanes(|k| {
+            let even = even.0 * power((self.moments[i] + moments[k]) * inverse[k], even.1);
+            let odd = odd.0 * power(self.skew[i].max(skew[k]) * root[k], odd.1);
+            if theta[k] <= FAR { kernel[k] * (even + odd) } else { f64::INFINITY }
+        });
+        // Far away the kernel with its largest cosines over the kernel is near 1.
+        if all(|k| errors[k] > relative * kernel[k]) {
+            return ([0.0; LANES], [f64::INFINITY; LANES]);
+        }
+
         // Heights over a plane do not depend on the point of that plane they are measured from.
         let mut heights = [[0.0; LANES]; MOST_POINTS];
         for ((p, weights), heights) in self.points.iter().zip(&self.weights).zip(&mut heights) {
             let (x, weight) = (own(p), weights[i]);
-            for k in 0..LANES {
+            *heights = lanes(|k| {
                 let r = [x[0] - centre[0][k], x[1] - centre[1][k], x[2] - centre[2][k]];
-                heights[k] = weight * (m[0][k] * r[0] + m[1][k] * r[1] + m[2][k] * r[2]);
-            }
+                weight * (m[0][k] * r[0] + m[1][k] * r[1] + m[2][k] * r[2])
+            });
         }
         let mut sum = [0.0; LANES];
         for (q, weights) in self.points.iter().zip(&self.weights) {
-            let (y, weight) = (load(q), lane(weights, columns));
+            let (y, weight) = (load(q), column(weights));
             let mut part = [0.0; LANES];
             for (p, heights) in self.points.iter().zip(&heights) {
                 let x = own(p);
-                for k in 0..LANES {
+                part = lanes(|k| {
                     let r = [y[0][k] - x[0], y[1][k] - x[1], y[2][k] - x[2]];
                     let squared = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
-                    part[k] += heights[k] / (squared * squared);
-                }
+                    part[k] + heights[k] / (squared * squared)
+                });
             }
-            for k in 0..LANES {
+            sum = lanes(|k| {
                 let r = [y[0][k] - c[0], y[1][k] - c[1], y[2][k] - c[2]];
-                sum[k] += weight[k] * part[k] * (n[0] * r[0] + n[1] * r[1] + n[2] * r[2]);
-            }
+                sum[k] + weight[k] * part[k] * (n[0] * r[0] + n[1] * r[1] + n[2] * r[2])
+            });
         }
-        let (area, radius) = (lane(&self.area, columns), lane(&self.radius, columns));
-        let (moments, skew) = (lane(&self.moments, columns), lane(&self.skew, columns));
-        let (even, odd) = (self.decay.even, self.decay.odd);
-        for k in 0..LANES {
-            let r = [centre[0][k] - c[0], centre[1][k] - c[1], centre[2][k] - c[2]];
-            let inverse = 1.0 / (r[0] * r[0] + r[1] * r[1] + r[2] * r[2]);
-            let root = inverse.sqrt();
-            let theta = (self.radius[i] + radius[k]) * root;
-            let height_p = n[0] * r[0] + n[1] * r[1] + n[2] * r[2];
-            let height_q = m[0][k] * r[0] + m[1][k] * r[1] + m[2][k] * r[2];
-            let largest = |height: f64| (height.abs() * root + theta).min(1.0);
-            let kernel = self.area[i] * area[k] * inverse / PI * largest(height_p) * largest(height_q);
-            let moments = power((self.moments[i] + moments[k]) * inverse, even.1);
-            let skew = power(self.skew[i].max(skew[k]) * root, odd.1);
-            values[k] = sum[k] / PI;
-            errors[k] = if theta <= FAR { kernel * (even.0 * moments + odd.0 * skew) } else { f64::INFINITY };
-        }
+        (lanes(|k| sum[k] / PI), errors)
     }
-}
-
-#[inline(always)]
-fn lane(from: &[f64], columns: &[usize; LANES]) -> [f64; LANES] {
-    [from[columns[0]], from[columns[1]], from[columns[2]], from[columns[3]]]
 }
 
 /// x^n for the small n of the rules; a call of the library would leave the wide registers.
@@ -256,7 +262,7 @@ mod tests {
             let exact = contour(&pair[0].corners, &pair[1].corners, 1e-15);
             let kind = usize::from(pair.iter().any(|p| p.corners.len() == 3));
             for (strength, far) in [FarPatches::low(&pair), FarPatches::middle(&pair)].iter().enumerate() {
-                far.factors(0, &[1], |_, value, estimate| {
+                far.factors(0, &[1], f64::INFINITY, |_, value, estimate| {
                     let error = ((value - exact.value).abs() - exact.error).max(0.0);
                     worst[strength][kind] = worst[strength][kind].max(error / estimate);
                 });
@@ -273,17 +279,20 @@ mod tests {
         let far = FarPatches::middle(&patches);
         let others: Vec<u32> = (0..30).filter(|&j| j != 3).collect();
         let mut together = Vec::new();
-        far.factors(3, &others, |_, value, error| together.push((value.to_bits(), error.to_bits())));
+        far.factors(3, &others, f64::INFINITY, |_, value, error| {
+            together.push((value.to_bits(), error.to_bits()))
+        });
         let mut portable = Vec::new();
-        for lanes in others.chunks(LANES) {
-            let columns = std::array::from_fn(|k| lanes[k.min(lanes.len() - 1)] as usize);
-            let (mut values, mut errors) = ([0.0; LANES], [0.0; LANES]);
-            far.lanes_portable(3, &columns, &mut values, &mut errors);
-            portable.extend((0..lanes.len()).map(|k| (values[k].to_bits(), errors[k].to_bits())));
+        for group in others.chunks(LANES) {
+            let columns = std::array::from_fn(|k| group[k.min(group.len() - 1)] as usize);
+            let (values, errors) = far.together_portable(3, &columns, f64::INFINITY);
+            portable.extend((0..group.len()).map(|k| (values[k].to_bits(), errors[k].to_bits())));
         }
         assert_eq!(portable, together, "wide and portable code differ");
         for (j, want) in others.iter().zip(together) {
-            far.factors(3, &[*j], |_, value, error| assert_eq!((value.to_bits(), error.to_bits()), want));
+            far.factors(3, &[*j], f64::INFINITY, |_, value, error| {
+                assert_eq!((value.to_bits(), error.to_bits()), want)
+            });
         }
     }
 }

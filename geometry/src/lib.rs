@@ -5,12 +5,17 @@
 
 pub mod area_rule;
 pub mod body;
+mod border_sum;
+pub mod cluster_kernel;
 pub mod contour;
 pub mod edge_pair;
 mod element_tree;
 pub mod far;
 pub mod gather;
 pub mod hemicube;
+mod interval;
+pub mod lanes;
+pub mod line_term;
 pub mod merge;
 pub mod occluded;
 pub mod occluder;
@@ -26,8 +31,9 @@ pub mod shadow;
 pub mod shadow_planes;
 pub mod sides;
 pub mod source_tree;
+pub mod square_rule;
 pub mod strata;
 pub mod unoccluded;
-pub mod visible_four;
 pub mod visible_part;
 pub mod visible_pieces;
+pub mod visible_together;

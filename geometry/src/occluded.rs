@@ -2,56 +2,61 @@
 //! along the shadow planes that cross it into cells over which the view changes smoothly, rules of rising order per cell.
 
 use crate::contour::Exchange;
+use crate::lanes::LANES;
 use crate::polygon;
 use crate::quadrature::gauss;
 use crate::shadow::{Blocking, From, Set, Shadows};
 use crate::shadow_planes::{ShadowPlane, WORTHLESS_CUT, shadow_planes};
-use crate::visible_four::{self, LANES, visible_factors};
+use crate::square_rule::{self, POINTS, Variation};
 use crate::visible_part::{Pieces, visible_factor};
+use crate::visible_together::{self, visible_factors};
 use glam::DVec3;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
-/// Points a side of the rules of rising order.
-const ORDERS: [usize; 3] = [2, 4, 8];
-/// The factor by which the distance between orders fell counts this many times in the error of the higher order: the next
-/// one may be less lucky.
+/// Rules of rising order, from the first on.
+const RULES: [Rule; 3] = [Rule::Eight, Rule::Gauss(4), Rule::Gauss(8)];
+/// The error of the eight points over a cell of one kind, relative to the value: at most this many times s3 max(s2, sqrt(s3)),
+/// and [`SMOOTH_MOST`] times s2 + s3 (s2, s3 the rule's variations over the value). 99 % of 2 10^5 cells of three scenes were
+/// below; sums over many cells overestimate 25 to 40 times.
+const SMOOTH_ERROR: f64 = 0.012;
+const SMOOTH_MOST: f64 = 0.004;
+/// The same where the error must hold by itself, times s2 + s3: as much as the distance from the first degree. At a border
+/// that both patches touch the variations see little of the singularity.
+const SMOOTH_ALONE: f64 = FIRST_DEGREE;
+/// Degrees 5 and 7 are near each other: where the error must hold by itself their distance counts this many times.
+const NEXT_DEGREE: f64 = 5.0;
+/// Over cells within which the view changes its kind, times s2 + s3: sums overestimate 5 to 20 times.
+const BENT_ERROR: f64 = 0.012;
+/// The same where the error must hold by itself: 0.137 was the most seen.
+const BENT_ALONE: f64 = 0.14;
+/// The distance of a rule of the first degree from the eight points, times s2 + s3.
+const FIRST_DEGREE: f64 = 0.3;
+/// The factor by which the distance between orders is thought to fall next counts this many times in the error of the
+/// higher order: the next one may be less lucky.
 const DECAY_ERROR: f64 = 5.0;
 /// A distance may be small by chance: it never counts less than this many times.
 const LEAST_DECAY: f64 = 0.05;
 /// Distances between orders that fall more slowly than this speak of a singularity at the cell's border (an edge that both
 /// patches touch): halving the cell helps more.
 const SLOW_DECAY: f64 = 0.1;
-/// Over a smooth cell the 2 x 2 rule errs like the square of its distance from the centre's value, relative to the value:
-/// that distance is the second order term, the error the fourth. The factor covers the worst of 10^5 cells.
-const SMOOTH_ERROR: f64 = 4.0;
-/// Second order terms may cancel, so that the centre agrees by chance. Then the fourth power of the relative variation v of
-/// the values tells: the 2 x 2 rule's error counts at least this many times v^4, and need not count more than
-/// [`MOST_VARIATION_ERROR`] (both relative to the value).
-const VARIATION_ERROR: f64 = 0.01;
-/// Most that the variation alone counts.
-const MOST_VARIATION_ERROR: f64 = 3e-5;
-/// Unless that is less than this share of the distance: 0.26 of it were seen as error where the centre agreed by chance.
-const CHANCE: f64 = 0.3;
-/// The same where the error must hold by itself: over triangles and other cells that are not their own mirror image
-/// terms of third order remain, with up to 0.07 v^3 seen where the centre agreed by chance.
-const ODD_ERROR: f64 = 0.1;
 /// Where shadow lines cross a cell, its points may all miss what lies between them: that much of the unblocked
 /// factor is never ruled out.
 const UNSEEN: f64 = 0.02;
-/// Corners are looked at from this part of the way to the centre inside.
-const CORNER_INSET: f64 = 1e-3;
-/// Share of the distance between the 2 x 2 rule and the mean over the corners that counts as error where the corners see
-/// something that the points do not: the part of the cell that it may fill.
-const CORNER_ERROR: f64 = 0.1;
-/// Share of the distance between the 2 x 2 rule and the centre's value that counts as error where edges of different
-/// bodies may cross: the view's second derivative may jump there, of which the rule misses a part.
-const KINK: f64 = 0.1;
-/// A cell whose corners are this many times farther off than its centre has a bend inside: higher orders do not help there.
-const BENT: f64 = 8.0;
+/// Running sums that fell below this part of their largest value are added up anew.
+const STALE: f64 = 1e-6;
 /// Up to this many shadow planes the receiver is cut along all of them at once; where there are more, along those that
 /// matter.
-const CUT_AT_ONCE: usize = 8;
+const CUT_AT_ONCE: usize = 16;
+
+/// A rule on a quadrilateral.
+#[derive(Debug, Clone, Copy)]
+enum Rule {
+    /// [`square_rule`], of the fifth degree.
+    Eight,
+    /// n x n Gauss points, of degree 2n - 1.
+    Gauss(usize),
+}
 
 /// What an occluded exchange factor cost.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -85,7 +90,7 @@ struct Cell {
     error: f64,
     /// Where the error must hold by itself: the error without the credit that holds on average only.
     doubt: f64,
-    /// Rule applied, as a place in [`ORDERS`].
+    /// Rule applied, as a place in [`RULES`].
     order: usize,
     /// Whether shadow planes may still cross it.
     crossed: bool,
@@ -117,11 +122,20 @@ impl Ord for Cell {
     }
 }
 
+/// Places in a cell and what they see: those of a rule with their weights first.
+#[derive(Debug, Default)]
+struct Points {
+    places: Vec<DVec3>,
+    weights: Vec<f64>,
+    seen: Vec<f64>,
+}
+
 /// Working memory of [`exchange`].
 #[derive(Debug, Default)]
 pub struct Scratch {
     visible: Pieces,
-    four: visible_four::Scratch,
+    together: visible_together::Scratch,
+    points: Points,
     corners: Vec<DVec3>,
     cells: BinaryHeap<Cell>,
     values: Vec<(f64, f64)>,
@@ -144,9 +158,6 @@ struct Integral<'s, 'a> {
     error: f64,
     doubt: f64,
     made: usize,
-    /// Least and largest value seen in the present cell.
-    low: f64,
-    high: f64,
 }
 
 /// Exchange factor of `receiver` and the polygon `source`, each wholly in front of the other, behind the shadows `which`;
@@ -181,8 +192,6 @@ pub fn exchange(
         error: 0.0,
         doubt: 0.0,
         made: 0,
-        low: 0.0,
-        high: 0.0,
     };
     let whole = Cell {
         corners: 0..corners.len(),
@@ -211,15 +220,19 @@ impl Integral<'_, '_> {
     fn run(&mut self, whole: Cell, planes: &[ShadowPlane]) {
         let demanding = self.wanted.tolerance < UNSEEN * self.wanted.unblocked;
         if demanding && planes.len() <= CUT_AT_ONCE {
-            self.cut_fully(whole, planes, planes.len());
+            let all: Vec<usize> = (0..planes.len()).collect();
+            self.cut_fully(whole, planes, &all, planes.len());
         } else {
             self.add(whole);
         }
+        let mut most = (0.0f64, 0.0f64);
         loop {
-            if self.is_met() {
-                // The running sums have rounding in them: only fresh ones count.
+            // The running sums have the rounding of their largest values in them: only fresh ones count.
+            (most.0, most.1) = (self.error.max(most.0), self.doubt.max(most.1));
+            if self.is_met() || self.error < STALE * most.0 || self.doubt < STALE * most.1 {
                 self.error = self.scratch.cells.iter().map(|c| c.error).sum();
                 self.doubt = self.scratch.cells.iter().map(|c| c.doubt * c.doubt).sum();
+                most = (self.error, self.doubt);
             }
             if self.is_met() || self.evaluations >= self.wanted.most_evaluations {
                 return;
@@ -237,13 +250,15 @@ impl Integral<'_, '_> {
         self.error <= self.wanted.tolerance && self.doubt <= self.wanted.tolerance * self.wanted.tolerance
     }
 
-    /// Cuts a cell along every plane that crosses it and integrates over the parts. Each plane cuts once on the way to a
-    /// part, so `cuts_left` ends it also where a plane through nearly collinear places is too ill defined to have cut cleanly.
-    fn cut_fully(&mut self, cell: Cell, planes: &[ShadowPlane], cuts_left: usize) {
-        match self.best_cut(&cell, planes) {
+    /// Cuts a cell along every one of the `candidates` (places in `planes`) that crosses it and integrates over the parts. Each
+    /// plane cuts once on the way to a part, so `cuts_left` ends it also where a plane through nearly collinear places is too
+    /// ill defined to have cut cleanly.
+    fn cut_fully(&mut self, cell: Cell, planes: &[ShadowPlane], candidates: &[usize], cuts_left: usize) {
+        let mut crossing = Vec::new();
+        match self.best_cut(&cell, planes, candidates, &mut crossing) {
             Some(plane) if cuts_left > 0 => {
                 for part in self.split(&cell, |p| plane.height(p)).into_iter().flatten() {
-                    self.cut_fully(part, planes, cuts_left - 1);
+                    self.cut_fully(part, planes, &crossing, cuts_left - 1);
                 }
             }
             left => self.add(Cell { crossed: left.is_some(), ..cell }),
@@ -252,7 +267,8 @@ impl Integral<'_, '_> {
 
     fn improve(&mut self, cell: Cell, planes: &[ShadowPlane]) {
         if cell.crossed {
-            match self.best_cut(&cell, planes) {
+            let all: Vec<usize> = (0..planes.len()).collect();
+            match self.best_cut(&cell, planes, &all, &mut Vec::new()) {
                 Some(plane) => {
                     for part in self.split(&cell, |p| plane.height(p)).into_iter().flatten() {
                         self.add(part);
@@ -260,7 +276,7 @@ impl Integral<'_, '_> {
                 }
                 None => self.raise(Cell { crossed: false, ..cell }),
             }
-        } else if cell.order + 1 < ORDERS.len() && !cell.is_rough {
+        } else if cell.order + 1 < RULES.len() && !cell.is_rough {
             self.raise(cell);
         } else {
             let corners = &self.scratch.corners[cell.corners.clone()];
@@ -276,18 +292,23 @@ impl Integral<'_, '_> {
         }
     }
 
-    /// Applies the next higher order to a cell. Where the distance between orders falls by a factor each time, the error of
-    /// the higher one is the distance times that factor.
+    /// Applies the next higher order to a cell. The rules are of degrees 5, 7 and 15, their errors powers 6, 8 and 16 of
+    /// one ratio: what the distance between orders fell by tells that ratio.
     fn raise(&mut self, mut cell: Cell) {
         cell.order += 1;
-        let value = self.integrate(&cell, ORDERS[cell.order]);
+        let value = self.integrate(&cell, RULES[cell.order]);
         let distance = (value - cell.value).abs();
         let decay = if cell.distance > 0.0 { distance / cell.distance } else { 0.0 };
-        cell.error = distance * (DECAY_ERROR * decay).clamp(LEAST_DECAY, 1.0);
+        // From degrees 1 and 5 the decay is the ratio's fourth power, the next rule's error the second power of it.
+        let next = if cell.order == 1 { decay.sqrt() } else { decay };
+        cell.error = distance * (DECAY_ERROR * next).clamp(LEAST_DECAY, 1.0);
         if self.wanted.alone {
-            // Each doubling of the order squares the relative error, should the present distance be small by chance.
+            // Should the present distance be small by chance, the one before tells: powers 2 to 8, and 6 to 16.
             let size = value.max(cell.value).max(f64::MIN_POSITIVE);
-            cell.doubt = distance.max((cell.distance / size).powi(4) * size);
+            let before = (cell.distance / size).min(1.0);
+            let power = if cell.order == 1 { before.powi(4) } else { before.powi(2) * before.cbrt().powi(2) };
+            let near = if cell.order == 1 { NEXT_DEGREE } else { 1.0 };
+            cell.doubt = (near * distance).max(power * size);
         }
         cell.is_rough |= decay > SLOW_DECAY;
         (cell.value, cell.distance) = (value, distance);
@@ -342,54 +363,46 @@ impl Integral<'_, '_> {
 
     /// Integrates over a new cell and estimates the error.
     fn add(&mut self, mut cell: Cell) {
-        (self.low, self.high) = (f64::INFINITY, 0.0);
-        let value = self.integrate(&cell, ORDERS[0]);
-        let centre = polygon::centroid(&self.scratch.corners[cell.corners.clone()]);
-        let middle = cell.area * self.at(centre, cell.shadows.clone());
-        let distance = (value - middle).abs();
-        (cell.value, cell.distance) = (value, distance);
-        let size = value.max(middle).max(f64::MIN_POSITIVE);
-        let variation = (self.high - self.low) * cell.area / size;
-        let odd = ODD_ERROR * variation.powi(3) * size;
+        self.place_rule(&cell, RULES[0]);
+        let is_of_one_kind = self.look(&cell);
+        cell.value = self.weighted_sum();
+        let Points { weights, seen, .. } = &self.scratch.points;
+        let mut varied = Variation::default();
+        for (weights, seen) in weights.chunks_exact(POINTS).zip(seen.chunks_exact(POINTS)) {
+            let part = Variation::new(&std::array::from_fn(|k| weights[k] * seen[k]));
+            varied = Variation { second: varied.second + part.second, third: varied.third + part.third };
+        }
+        let both = varied.second + varied.third;
+        let alone = self.wanted.alone;
+        cell.distance = FIRST_DEGREE * both;
         cell.error = if cell.crossed {
-            distance.max(UNSEEN * cell.area / self.receiver_area * self.wanted.unblocked)
-        } else if cell.shadows.len() < 2 && self.wanted.alone {
-            distance.max(odd)
-        } else if cell.shadows.len() < 2 {
-            let most = MOST_VARIATION_ERROR.max(CHANCE * distance / size);
-            let varied = (VARIATION_ERROR * variation.powi(4)).min(most);
-            let smooth = SMOOTH_ERROR * distance / size;
-            (distance * smooth.min(1.0)).max(varied * size)
+            (BENT_ALONE * both).max(UNSEEN * cell.area / self.receiver_area * self.wanted.unblocked)
+        } else if is_of_one_kind && alone {
+            SMOOTH_ALONE * both
+        } else if is_of_one_kind {
+            let size = cell.value.max(f64::MIN_POSITIVE);
+            let decay = (varied.second / size).max((varied.third / size).sqrt());
+            (SMOOTH_ERROR * varied.third * decay).min(SMOOTH_MOST * both)
         } else {
-            // Edges of different bodies that seem to cross (EEE) are in no shadow plane: what they let through or take
-            // away shows first in the cell's corners.
-            let outer = self.mean_near_corners(centre, &cell);
-            let tip = (value - cell.area * outer).abs();
-            cell.is_rough = tip > BENT * distance;
-            (KINK * distance).max(if cell.is_rough { CORNER_ERROR * tip } else { 0.0 })
+            // Edges of different bodies that seem to cross are in no shadow plane. Higher orders help little there, but
+            // they tell where much less is to be feared.
+            cell.is_rough = !alone;
+            if alone { BENT_ALONE * both } else { BENT_ERROR * both }
         };
-        if self.wanted.alone {
-            cell.doubt = cell.error.max(distance).max(odd);
+        if alone {
+            cell.doubt = cell.error;
         }
         self.keep(cell);
     }
 
-    /// Mean of what is seen just inside the corners: on a contact line the corner itself has no view of its own.
-    fn mean_near_corners(&mut self, centre: DVec3, cell: &Cell) -> f64 {
-        let count = cell.corners.len();
-        let inset = |corner: DVec3| corner + CORNER_INSET * (centre - corner);
-        let mut sum = 0.0;
-        for first in (0..count).step_by(LANES) {
-            let number = (count - first).min(LANES);
-            let at = |k: usize| inset(self.scratch.corners[cell.corners.start + first + k.min(number - 1)]);
-            let points = [at(0), at(1), at(2), at(3)];
-            sum += self.at_four(&points, cell)[..number].iter().sum::<f64>();
-        }
-        sum / count as f64
-    }
-
-    /// The shadow plane that cuts the cell most evenly.
-    fn best_cut(&self, cell: &Cell, planes: &[ShadowPlane]) -> Option<ShadowPlane> {
+    /// The shadow plane among the `candidates` that cuts the cell most evenly; those that cut it are put into `crossing`.
+    fn best_cut(
+        &self,
+        cell: &Cell,
+        planes: &[ShadowPlane],
+        candidates: &[usize],
+        crossing: &mut Vec<usize>,
+    ) -> Option<ShadowPlane> {
         if cell.shadows.is_empty() {
             return None;
         }
@@ -397,73 +410,87 @@ impl Integral<'_, '_> {
         let tolerance = WORTHLESS_CUT * polygon::diameter(corners);
         let mut best = None;
         let mut best_balance = 0.0;
-        for plane in planes {
-            if let Some(balance) = plane.cut_balance(corners, tolerance)
-                && balance > best_balance
-            {
-                best_balance = balance;
-                best = Some(*plane);
+        for &at in candidates {
+            if let Some(balance) = planes[at].cut_balance(corners, tolerance) {
+                crossing.push(at);
+                if balance > best_balance {
+                    best_balance = balance;
+                    best = Some(planes[at]);
+                }
             }
         }
         best
     }
 
-    fn at(&mut self, point: DVec3, shadows: Range<usize>) -> f64 {
-        self.evaluations += 1;
-        let scratch = &mut self.scratch.visible;
+    /// What the places see of the source past the shadows of a cell; `true` where all see it in one way.
+    fn look(&mut self, cell: &Cell) -> bool {
+        let Scratch { visible, together, points, .. } = &mut *self.scratch;
         let (source, from) = (self.source.corners, self.from);
-        let seen = visible_factor(point, self.normal, source, self.shadows, shadows, from, scratch);
-        (self.low, self.high) = (self.low.min(seen), self.high.max(seen));
-        seen
-    }
-
-    /// What four points of a cell see.
-    fn at_four(&mut self, points: &[DVec3; LANES], cell: &Cell) -> [f64; LANES] {
-        let (source, which) = (self.source.corners, (cell.shadows.clone(), self.from));
-        match visible_factors(points, self.normal, source, self.shadows, which, &mut self.scratch.four) {
-            None => points.map(|point| self.at(point, cell.shadows.clone())),
-            Some(seen) => {
-                self.evaluations += LANES;
-                for value in seen {
-                    (self.low, self.high) = (self.low.min(value), self.high.max(value));
+        self.evaluations += points.places.len();
+        points.seen.clear();
+        let mut kind = None;
+        let mut is_of_one_kind = true;
+        for places in points.places.chunks(LANES) {
+            let group = std::array::from_fn(|k| places[k.min(places.len() - 1)]);
+            let which = cell.shadows.clone();
+            match visible_factors(&group, self.normal, source, self.shadows, (which.clone(), from), together)
+            {
+                Some(found) => {
+                    points.seen.extend_from_slice(&found.factors[..places.len()]);
+                    is_of_one_kind &= found.kind.is_some() && (kind.is_none() || kind == found.kind);
+                    kind = found.kind;
                 }
-                seen
+                None => {
+                    is_of_one_kind = false;
+                    points.seen.extend(places.iter().map(|&place| {
+                        visible_factor(place, self.normal, source, self.shadows, which.clone(), from, visible)
+                    }));
+                }
             }
         }
+        is_of_one_kind
     }
 
-    /// n x n Gauss points on each quadrilateral of a fan, squeezed into triangles.
-    fn integrate(&mut self, cell: &Cell, n: usize) -> f64 {
-        let rule = gauss(n);
-        let count = cell.corners.len();
-        let mut value = 0.0;
-        let mut k = 1;
-        while k + 1 < count {
-            let corner = |at: usize| self.scratch.corners[cell.corners.start + at];
-            let (a, b, c) = (corner(0), corner(k), corner(k + 1));
+    /// Sum of the rule whose points have been looked at.
+    fn weighted_sum(&self) -> f64 {
+        let Points { weights, seen, .. } = &self.scratch.points;
+        weights.iter().zip(seen).map(|(weight, seen)| weight * seen).sum()
+    }
+
+    fn integrate(&mut self, cell: &Cell, rule: Rule) -> f64 {
+        self.place_rule(cell, rule);
+        self.look(cell);
+        self.weighted_sum()
+    }
+
+    /// Places the points of a rule on each quadrilateral of a fan, squeezed into triangles.
+    fn place_rule(&mut self, cell: &Cell, rule: Rule) {
+        let Scratch { points: Points { places, weights, .. }, corners, .. } = &mut *self.scratch;
+        places.clear();
+        weights.clear();
+        let corners = &corners[cell.corners.clone()];
+        for k in (1..corners.len() - 1).step_by(2) {
+            let (a, b, c) = (corners[0], corners[k], corners[k + 1]);
             // A triangle is a quadrilateral whose first corner is doubled.
-            let d = if k + 2 < count { corner(k + 2) } else { a };
-            // Orders are even: the points come in fours.
-            let (mut points, mut weights, mut filled) = ([DVec3::ZERO; LANES], [0.0; LANES], 0);
-            for (s, ws) in rule.points.iter().zip(&rule.weights) {
-                let s = 0.5 * (1.0 + s);
-                let (near, far) = (a + s * (b - a), d + s * (c - d));
-                let (along_near, along_far) = (b - a, c - d);
-                for (t, wt) in rule.points.iter().zip(&rule.weights) {
-                    let t = 0.5 * (1.0 + t);
-                    let along = along_near + t * (along_far - along_near);
-                    points[filled] = near + t * (far - near);
-                    weights[filled] = 0.25 * ws * wt * along.cross(far - near).dot(self.normal);
-                    filled += 1;
-                    if filled == LANES {
-                        let seen = self.at_four(&points, cell);
-                        value += (0..LANES).map(|k| weights[k] * seen[k]).sum::<f64>();
-                        filled = 0;
+            let d = corners.get(k + 2).copied().unwrap_or(a);
+            let (along_near, along_far) = (b - a, c - d);
+            let mut place = |s: f64, t: f64, weight: f64| {
+                let (near, far) = (a + s * along_near, d + s * along_far);
+                let along = along_near + t * (along_far - along_near);
+                places.push(near + t * (far - near));
+                weights.push(weight * along.cross(far - near).dot(self.normal));
+            };
+            match rule {
+                Rule::Eight => square_rule::for_each_point(place),
+                Rule::Gauss(n) => {
+                    let rule = gauss(n);
+                    for (s, ws) in rule.points.iter().zip(&rule.weights) {
+                        for (t, wt) in rule.points.iter().zip(&rule.weights) {
+                            place(0.5 * (1.0 + s), 0.5 * (1.0 + t), 0.25 * ws * wt);
+                        }
                     }
                 }
             }
-            k += 2;
         }
-        value
     }
 }

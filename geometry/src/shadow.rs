@@ -288,7 +288,7 @@ impl<'a> Shadows<'a> {
         }
         let is_known = left != 0 || right != 0;
         let inward = if left == 1 || right == -1 { -1.0 } else { 1.0 };
-        match volumes(edge.from, edge.to, receiver, source, size) {
+        match signs(edge.from, edge.to, receiver, source, size) {
             Sign::Both => Cut::Across,
             Sign::None => {
                 if is_known {
@@ -379,11 +379,9 @@ impl<'a> Shadows<'a> {
             polygon::diameter(receiver) + polygon::diameter(source) + (receiver[0] - source[0]).length();
         for at in which {
             self.for_each_edge(at, from, |edge| {
-                for corner in source {
-                    let corner = std::slice::from_ref(corner);
-                    let sign = volumes(edge.from, edge.to, receiver, corner, size);
-                    count += usize::from(matches!(sign, Sign::Both));
-                }
+                volumes(edge.from, edge.to, receiver, source, size, |low, high, rounding| {
+                    count += usize::from(low < -rounding && high > rounding);
+                });
             });
         }
         count
@@ -426,21 +424,45 @@ enum Sign {
     Both,
 }
 
-/// Signs of g(x, y) over the corners of two sets that fit into `size`. With x and y taken from the edge's start, g is
-/// x . (y x l): one cross product per y, one scalar product per pair.
-fn volumes(from: DVec3, to: DVec3, receiver: &[DVec3], source: &[DVec3], size: f64) -> Sign {
+/// Signs of g(x, y) over the corners of two sets that fit into `size`.
+fn signs(from: DVec3, to: DVec3, receiver: &[DVec3], source: &[DVec3], size: f64) -> Sign {
+    let (mut is_below, mut is_above) = (false, false);
+    volumes(from, to, receiver, source, size, |low, high, rounding| {
+        is_below |= low < -rounding;
+        is_above |= high > rounding;
+    });
+    match (is_below, is_above) {
+        (false, false) => Sign::None,
+        (true, true) => Sign::Both,
+        (true, false) => Sign::One(-1.0),
+        (false, true) => Sign::One(1.0),
+    }
+}
+
+/// Calls `visit(low, high, rounding)` for every corner y of the source: the extremes of 0 and of g(x, y) over the receiver's
+/// corners x, and what of them is rounding. With x and y taken from the edge's start, g is x . (y x l): one cross product
+/// per y, one scalar product per pair.
+#[inline(always)]
+fn volumes(
+    from: DVec3,
+    to: DVec3,
+    receiver: &[DVec3],
+    source: &[DVec3],
+    size: f64,
+    mut visit: impl FnMut(f64, f64, f64),
+) {
     /// Corners of the source looked at together.
     const LANES: usize = 4;
     let along = to - from;
     let reach = size + (from - receiver[0]).length();
     let rounding = EDGE_ROUNDING * reach * reach * along.length();
-    let (mut low, mut high) = ([0.0f64; LANES], [0.0f64; LANES]);
     for group in source.chunks(LANES) {
         let (mut wx, mut wy, mut wz) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for (k, &y) in group.iter().enumerate() {
             let w = (y - from).cross(along);
             (wx[k], wy[k], wz[k]) = (w.x, w.y, w.z);
         }
+        let (mut low, mut high) = ([0.0f64; LANES], [0.0f64; LANES]);
         for &x in receiver {
             let x = x - from;
             for k in 0..LANES {
@@ -449,13 +471,6 @@ fn volumes(from: DVec3, to: DVec3, receiver: &[DVec3], source: &[DVec3], size: f
                 high[k] = if volume > high[k] { volume } else { high[k] };
             }
         }
-    }
-    let low = low.iter().fold(0.0, |least: f64, &x| if x < least { x } else { least });
-    let high = high.iter().fold(0.0, |most: f64, &x| if x > most { x } else { most });
-    match (low < -rounding, high > rounding) {
-        (false, false) => Sign::None,
-        (true, true) => Sign::Both,
-        (true, false) => Sign::One(-1.0),
-        (false, true) => Sign::One(1.0),
+        (0..group.len()).for_each(|k| visit(low[k], high[k], rounding));
     }
 }

@@ -273,7 +273,9 @@ impl Arguments {
             Command::Sheet(sheet) => {
                 return sheet.usage().or_else(|message| bad(ErrorKind::WrongNumberOfValues, message));
             }
-            Command::Probe(_) | Command::Compare(_) | Command::Pages { .. } | Command::Info(_) => return Ok(()),
+            Command::Probe(_) | Command::Compare(_) | Command::Pages { .. } | Command::Info(_) => {
+                return Ok(());
+            }
         };
         if render.tone.given() && render.png.is_none() {
             let message = "--exposure and --curve are for the preview: give --png";
