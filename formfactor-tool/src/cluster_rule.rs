@@ -2,7 +2,9 @@
 
 use crate::scene::{Cluster, Scene};
 use geometry::cluster_kernel::{Basis, Kernel, ORDERS};
+use std::borrow::Cow;
 use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 /// Fewer pairs than these are served faster one by one.
 const FEWEST_PAIRS: usize = 36;
@@ -15,10 +17,15 @@ const HOPE: f64 = 4.0;
 /// Below this relative error elements within rounding of their cluster's plane may count.
 const TIGHTEST: f64 = 1e-7;
 
+/// Bases are kept up to this many bytes; others are made anew each time, with the same bits.
+pub const MOST_KEPT: usize = 4 << 20;
+
 /// Bases of the clusters, made when they are first needed.
 #[derive(Debug)]
 pub struct ClusterRule {
-    bases: Vec<[OnceLock<Option<Basis>>; ORDERS.len()]>,
+    bases: Vec<[OnceLock<Box<Basis>>; ORDERS.len()]>,
+    /// Bytes of those that are kept.
+    kept: AtomicUsize,
     /// Error of a row's factors over their sum.
     relative: f64,
 }
@@ -26,8 +33,10 @@ pub struct ClusterRule {
 impl ClusterRule {
     /// For the clusters of a scene; `None` where the error asked is too small.
     pub fn new(scene: &Scene, relative: f64) -> Option<Self> {
-        (relative >= TIGHTEST)
-            .then(|| Self { bases: scene.clusters.iter().map(|_| Default::default()).collect(), relative })
+        (relative >= TIGHTEST).then(|| {
+            let bases = scene.clusters.iter().map(|_| Default::default()).collect();
+            Self { bases, kept: AtomicUsize::new(0), relative }
+        })
     }
 
     /// The exchange factors of all pairs of two clusters, each wholly in front of the other, row after row into `values`, and
@@ -52,9 +61,9 @@ impl ClusterRule {
             }
             if hopeful(order) {
                 let (p, q) = (self.basis(scene, first, at)?, self.basis(scene, second, at)?);
-                let kernel: Kernel = p.kernel(q)?;
+                let kernel: Kernel = p.kernel(&q)?;
                 if kernel.error <= self.relative * kernel.mean {
-                    p.exchange(q, &kernel, values);
+                    p.exchange(&q, &kernel, values);
                     return Some(kernel.error);
                 }
             }
@@ -67,12 +76,18 @@ impl ClusterRule {
         first.len() * second.len() >= 2 * FEWEST_PAIRS
     }
 
-    fn basis(&self, scene: &Scene, cluster: &Cluster, at: usize) -> Option<&Basis> {
-        let make = || {
-            let corners: [_; 4] = cluster.hull.as_slice().try_into().ok()?;
-            let patches = scene.patches[cluster.range.clone()].iter().map(|p| p.corners.as_slice());
-            Some(Basis::new(corners, cluster.plane?.normal, patches, ORDERS[at]))
-        };
-        self.bases[cluster.number][at].get_or_init(make).as_ref()
+    fn basis(&self, scene: &Scene, cluster: &Cluster, at: usize) -> Option<Cow<'_, Basis>> {
+        let place = &self.bases[cluster.number][at];
+        if let Some(basis) = place.get() {
+            return Some(Cow::Borrowed(basis));
+        }
+        let corners: [_; 4] = cluster.hull.as_slice().try_into().ok()?;
+        let patches = scene.patches[cluster.range.clone()].iter().map(|p| p.corners.as_slice());
+        let basis = Basis::new(corners, cluster.plane?.normal, patches, ORDERS[at]);
+        if self.kept.fetch_add(basis.bytes(), Relaxed) + basis.bytes() > MOST_KEPT {
+            self.kept.fetch_sub(basis.bytes(), Relaxed);
+            return Some(Cow::Owned(basis));
+        }
+        Some(Cow::Borrowed(place.get_or_init(|| Box::new(basis))))
     }
 }

@@ -1,6 +1,7 @@
 //! What a run will take, known before it begins: time by a fixed cost model, bytes on disk, and the bound on memory that
 //! the run then keeps.
 
+use crate::cluster_rule::MOST_KEPT;
 use crate::estimator::Estimator;
 use crate::scene::Scene;
 use crate::traversal::{LeafPair, Settled};
@@ -58,7 +59,7 @@ pub fn memory(
     allowed: Option<u64>,
 ) -> Result<Memory, TooLittle> {
     let kept = elements as u64 * VECTORS * 8 + pairs.len() as u64 * PER_TILE;
-    let fixed = resident + kept + BUFFERS + threads as u64 * PER_THREAD;
+    let fixed = resident + kept + MOST_KEPT as u64 + BUFFERS + threads as u64 * PER_THREAD;
     let largest = pairs.iter().map(tile_bytes).max().unwrap_or(0);
     let all: u64 = pairs.iter().map(tile_bytes).sum();
     let in_flight = match allowed {

@@ -345,7 +345,7 @@ fn equal_poses() {
 #[test]
 fn far_rules() {
     let contour = "pairs unoccluded, contour";
-    let far = ["one point", "few points", "several points", "many points"];
+    let far = ["one point", "few points", "several points", "many points", "by whole clusters"];
     let far =
         |c: &Computed| -> u64 { far.map(|rule| c.count(&format!("pairs unoccluded, {rule}"))).iter().sum() };
     let loose = ["--tolerance", "1e-2", "--precision", "f64"];

@@ -28,10 +28,9 @@ pub struct Basis {
     nodes: [Vec<f64>; 3],
     /// Values of the polynomials at each corner.
     at_corners: [Vec<f64>; 4],
-    /// Integral of polynomial a over patch i, at i p^2 + a.
+    /// Integral of polynomial a over patch i, at a n + i, n the number of patches.
     moments: Vec<f64>,
-    /// The same at a n + i, n the number of patches.
-    turned: Vec<f64>,
+    patches: usize,
 }
 
 /// The kernel between two sets, interpolated.
@@ -59,7 +58,7 @@ impl Basis {
         let place = |s: f64, t: f64| corners[0] + 0.5 * (1.0 + s) * x + 0.5 * (1.0 + t) * y;
         let points = nodes.iter().flat_map(|&s| nodes.iter().map(move |&t| (s, t)));
         let points: Vec<DVec3> = points.map(|(s, t)| place(s, t)).collect();
-        let mut moments: Vec<f64> = Vec::new();
+        let mut by_patch: Vec<f64> = Vec::new();
         let (mut rule, mut weights) = (Vec::new(), Vec::new());
         let (mut of_s, mut of_t) = (vec![0.0; order], vec![0.0; order]);
         let along = |p: DVec3, axis: DVec3| 2.0 * (p - corners[0]).dot(axis) / axis.length_squared() - 1.0;
@@ -68,21 +67,21 @@ impl Basis {
             rule.clear();
             weights.clear();
             polygon_rule(patch, Strength::Product(order), &mut rule, &mut weights);
-            let first = moments.len();
-            moments.resize(first + order * order, 0.0);
+            let first = by_patch.len();
+            by_patch.resize(first + order * order, 0.0);
             for (&point, &weight) in rule.iter().zip(&weights) {
                 polynomials.at(along(point, x), &mut of_s);
                 polynomials.at(along(point, y), &mut of_t);
-                for (row, s) in moments[first..].chunks_exact_mut(order).zip(&of_s) {
+                for (row, s) in by_patch[first..].chunks_exact_mut(order).zip(&of_s) {
                     row.iter_mut().zip(&of_t).for_each(|(moment, t)| *moment += weight * s * t);
                 }
             }
         }
         let size = order * order;
-        let count = moments.len() / size;
-        let mut turned = vec![0.0; moments.len()];
-        for (i, moments) in moments.chunks_exact(size).enumerate() {
-            moments.iter().enumerate().for_each(|(a, &moment)| turned[a * count + i] = moment);
+        let patches = by_patch.len() / size;
+        let mut moments = vec![0.0; by_patch.len()];
+        for (i, of_patch) in by_patch.chunks_exact(size).enumerate() {
+            of_patch.iter().enumerate().for_each(|(a, &moment)| moments[a * patches + i] = moment);
         }
         Self {
             order,
@@ -91,8 +90,13 @@ impl Basis {
             nodes: [0, 1, 2].map(|axis| points.iter().map(|p| p[axis]).collect()),
             at_corners: corner_weights(&polynomials),
             moments,
-            turned,
+            patches,
         }
+    }
+
+    /// Memory it takes.
+    pub fn bytes(&self) -> usize {
+        size_of::<Self>() + size_of::<f64>() * (self.moments.len() + 7 * self.order * self.order)
     }
 
     fn node(&self, a: usize) -> DVec3 {
@@ -196,16 +200,17 @@ impl Basis {
     #[inline(always)]
     fn exchange_portable(&self, other: &Basis, kernel: &Kernel, out: &mut Vec<f64>) {
         let size = self.order * self.order;
-        let columns = other.moments.len() / size;
+        let columns = other.patches;
         out.clear();
-        out.resize(self.moments.len() / size * columns, 0.0);
+        out.resize(self.patches * columns, 0.0);
         let mut half = vec![0.0; size];
-        for (row, moments) in out.chunks_exact_mut(columns).zip(self.moments.chunks_exact(size)) {
+        for (i, row) in out.chunks_exact_mut(columns.max(1)).enumerate() {
             half.fill(0.0);
-            for (&moment, values) in moments.iter().zip(kernel.values.chunks_exact(size)) {
+            for (a, values) in kernel.values.chunks_exact(size).enumerate() {
+                let moment = self.moments[a * self.patches + i];
                 half.iter_mut().zip(values).for_each(|(sum, value)| *sum += moment * value);
             }
-            for (&weight, of_columns) in half.iter().zip(other.turned.chunks_exact(columns)) {
+            for (&weight, of_columns) in half.iter().zip(other.moments.chunks_exact(columns.max(1))) {
                 row.iter_mut().zip(of_columns).for_each(|(sum, moment)| *sum += weight * moment);
             }
         }

@@ -99,8 +99,8 @@ fn bad_usage_is_2() {
 
 /// Flags and subcommands of later versions: unknown until they do something.
 const LATER: &[&str] = &[
-    "shade-tool render a.sol --mesh a.mesh -o a.exr --interpolation quadratic",
-    "shade-tool render a.sol --mesh a.mesh -o a.exr --interpolation linear",
+    "shade-tool render a.sol --mesh a.mesh -o a.exr --shading whitted",
+    "solve-tool solve a.ff --mesh a.mesh -o a.sol --medium fog.toml",
 ];
 
 #[test]
@@ -109,7 +109,7 @@ fn what_belongs_to_later_versions_is_2_and_not_in_the_help() {
         assert_usage(line);
         let words: Vec<&str> = line.split_whitespace().collect();
         let later = words[words.len() - 2];
-        if !later.starts_with("--") || matches!(later, "--method" | "--solver") {
+        if !later.starts_with("--") || matches!(later, "--method" | "--solver" | "--shading") {
             continue;
         }
         let help = exit(&format!("{} {} --help", words[0], words[1])).expect_code(0).stdout;
