@@ -17,15 +17,13 @@ const HOPE: f64 = 4.0;
 /// Below this relative error elements within rounding of their cluster's plane may count.
 const TIGHTEST: f64 = 1e-7;
 
-/// Bases are kept up to this many bytes; others are made anew each time, with the same bits.
-pub const MOST_KEPT: usize = 4 << 20;
-
 /// Bases of the clusters, made when they are first needed.
 #[derive(Debug)]
 pub struct ClusterRule {
     bases: Vec<[OnceLock<Box<Basis>>; ORDERS.len()]>,
-    /// Bytes of those that are kept.
+    /// Bytes of those that are kept, and the most that may be; others are made anew each time, with the same bits.
     kept: AtomicUsize,
+    allowed: AtomicUsize,
     /// Error of a row's factors over their sum.
     relative: f64,
 }
@@ -35,8 +33,13 @@ impl ClusterRule {
     pub fn new(scene: &Scene, relative: f64) -> Option<Self> {
         (relative >= TIGHTEST).then(|| {
             let bases = scene.clusters.iter().map(|_| Default::default()).collect();
-            Self { bases, kept: AtomicUsize::new(0), relative }
+            Self { bases, kept: AtomicUsize::new(0), allowed: AtomicUsize::new(0), relative }
         })
+    }
+
+    /// Allows so many bytes for bases that are kept.
+    pub fn allow(&self, bytes: usize) {
+        self.allowed.store(bytes, Relaxed);
     }
 
     /// The exchange factors of all pairs of two clusters, each wholly in front of the other, row after row into `values`, and
@@ -84,7 +87,7 @@ impl ClusterRule {
         let corners: [_; 4] = cluster.hull.as_slice().try_into().ok()?;
         let patches = scene.patches[cluster.range.clone()].iter().map(|p| p.corners.as_slice());
         let basis = Basis::new(corners, cluster.plane?.normal, patches, ORDERS[at]);
-        if self.kept.fetch_add(basis.bytes(), Relaxed) + basis.bytes() > MOST_KEPT {
+        if self.kept.fetch_add(basis.bytes(), Relaxed) + basis.bytes() > self.allowed.load(Relaxed) {
             self.kept.fetch_sub(basis.bytes(), Relaxed);
             return Some(Cow::Owned(basis));
         }

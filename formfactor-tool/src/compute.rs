@@ -58,6 +58,7 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     let precision = request.storage.precision(tolerance);
     let threads = rayon::current_num_threads();
     let memory = plan::memory(&pairs, scene.len(), threads, plan::resident(), request.storage.memory)?;
+    estimator.allow(memory.anew);
     if request.storage.dry_run {
         print_data(&plan::describe(
             &scene,

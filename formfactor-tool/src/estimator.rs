@@ -19,6 +19,9 @@ pub trait Estimator: Sync {
     /// Expected work of a leaf pair in a unit of its own: for balancing shards and the time left.
     fn work(&self, pair: &LeafPair) -> f64;
 
+    /// Allows so many bytes for what it can make anew: never a matter of the result.
+    fn allow(&self, _bytes: u64) {}
+
     /// Counters and estimates of its own, after all tiles.
     fn note(&self, _report: &mut Report) {}
 

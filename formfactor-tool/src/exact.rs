@@ -106,6 +106,12 @@ impl Estimator for Exact<'_> {
         pair.pairs() as f64 * (1.0 + pair.blockers.len() as f64)
     }
 
+    fn allow(&self, bytes: u64) {
+        if let Some(clusters) = &self.clusters {
+            clusters.allow(bytes as usize);
+        }
+    }
+
     fn note(&self, report: &mut Report) {
         let distinct = self.poses.as_ref().map_or(0, Poses::distinct);
         let spared = self.poses.as_ref().map_or(0, Poses::spared);

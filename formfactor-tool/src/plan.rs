@@ -1,7 +1,6 @@
 //! What a run will take, known before it begins: time by a fixed cost model, bytes on disk, and the bound on memory that
 //! the run then keeps.
 
-use crate::cluster_rule::MOST_KEPT;
 use crate::estimator::Estimator;
 use crate::scene::Scene;
 use crate::traversal::{LeafPair, Settled};
@@ -17,6 +16,9 @@ const BUFFERS: u64 = 24 << 20;
 const PER_THREAD: u64 = 4 << 20;
 /// Vectors of one f64 per element: errors, sums, areas, and a dozen while closing.
 const VECTORS: u64 = 20;
+/// What can be made anew is kept up to this many bytes in all and for each element, and up to half of what `--memory` leaves.
+const MOST_KEPT: u64 = 64 << 20;
+const KEPT_PER_ELEMENT: u64 = 6 << 10;
 /// What is kept of a tile until the end: its block.
 const PER_TILE: u64 = 32;
 
@@ -32,6 +34,8 @@ pub struct Memory {
     pub bound: u64,
     /// Of it, for tiles that are computed or wait.
     pub in_flight: u64,
+    /// Of it, for what can be made anew.
+    pub anew: u64,
 }
 
 /// The memory needed is more than allowed.
@@ -59,17 +63,17 @@ pub fn memory(
     allowed: Option<u64>,
 ) -> Result<Memory, TooLittle> {
     let kept = elements as u64 * VECTORS * 8 + pairs.len() as u64 * PER_TILE;
-    let fixed = resident + kept + MOST_KEPT as u64 + BUFFERS + threads as u64 * PER_THREAD;
+    let fixed = resident + kept + BUFFERS + threads as u64 * PER_THREAD;
     let largest = pairs.iter().map(tile_bytes).max().unwrap_or(0);
     let all: u64 = pairs.iter().map(tile_bytes).sum();
-    let in_flight = match allowed {
-        None => IN_FLIGHT.max(largest).min(all),
-        Some(allowed) if allowed < fixed + largest => {
-            return Err(TooLittle { allowed, needed: fixed + largest });
-        }
-        Some(allowed) => (allowed - fixed).min(IN_FLIGHT.max(largest)).min(all),
-    };
-    Ok(Memory { bound: fixed + in_flight, in_flight })
+    if let Some(allowed) = allowed.filter(|&allowed| allowed < fixed + largest) {
+        return Err(TooLittle { allowed, needed: fixed + largest });
+    }
+    let most_anew = MOST_KEPT.min(elements as u64 * KEPT_PER_ELEMENT);
+    let anew = allowed.map_or(most_anew, |allowed| most_anew.min((allowed - fixed - largest) / 2));
+    let most = IN_FLIGHT.max(largest).min(all);
+    let in_flight = allowed.map_or(most, |allowed| most.min(allowed - fixed - anew));
+    Ok(Memory { bound: fixed + anew + in_flight, in_flight, anew })
 }
 
 /// Largest resident memory so far, bytes.

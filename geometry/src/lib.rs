@@ -6,6 +6,8 @@
 pub mod area_rule;
 pub mod body;
 mod border_sum;
+mod cell;
+mod cell_rule;
 pub mod cluster_kernel;
 pub mod contour;
 pub mod edge_pair;

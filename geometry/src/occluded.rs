@@ -1,13 +1,13 @@
 //! Exchange factor of two patches with blockers between them: exact visible parts from receiver points, the receiver cut
 //! along the shadow planes that cross it into cells over which the view changes smoothly, rules of rising order per cell.
 
+use crate::cell::Cell;
+use crate::cell_rule::{Points, Rule};
 use crate::contour::Exchange;
 use crate::lanes::LANES;
 use crate::polygon;
-use crate::quadrature::gauss;
 use crate::shadow::{Blocking, From, Set, Shadows};
 use crate::shadow_planes::{ShadowPlane, WORTHLESS_CUT, shadow_planes};
-use crate::square_rule::{self, POINTS, Variation};
 use crate::visible_part::{Pieces, visible_factor};
 use crate::visible_together::{self, visible_factors};
 use glam::DVec3;
@@ -49,15 +49,6 @@ const STALE: f64 = 1e-6;
 /// matter.
 const CUT_AT_ONCE: usize = 16;
 
-/// A rule on a quadrilateral.
-#[derive(Debug, Clone, Copy)]
-enum Rule {
-    /// [`square_rule`], of the fifth degree.
-    Eight,
-    /// n x n Gauss points, of degree 2n - 1.
-    Gauss(usize),
-}
-
 /// What an occluded exchange factor cost.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Effort {
@@ -79,55 +70,6 @@ pub struct Wanted {
     pub alone: bool,
     /// Most visible parts to compute.
     pub most_evaluations: usize,
-}
-
-/// A convex part of the receiver with its integral.
-#[derive(Debug, Clone, Default)]
-struct Cell {
-    corners: Range<usize>,
-    shadows: Range<usize>,
-    value: f64,
-    error: f64,
-    /// Where the error must hold by itself: the error without the credit that holds on average only.
-    doubt: f64,
-    /// Rule applied, as a place in [`RULES`].
-    order: usize,
-    /// Whether shadow planes may still cross it.
-    crossed: bool,
-    /// Distance of the value from the one by the order before.
-    distance: f64,
-    /// Whether higher orders do not help: there is a bend or a singularity inside or at the border.
-    is_rough: bool,
-    area: f64,
-    /// Its part in what has to fall: the larger of its shares in the sums of errors and of squared doubts.
-    urgency: f64,
-    /// Order of creation: makes the queue's order unique.
-    serial: usize,
-}
-
-impl PartialEq for Cell {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-impl Eq for Cell {}
-impl PartialOrd for Cell {
-    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        Some(self.cmp(other))
-    }
-}
-impl Ord for Cell {
-    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
-        self.urgency.total_cmp(&other.urgency).then(other.serial.cmp(&self.serial))
-    }
-}
-
-/// Places in a cell and what they see: those of a rule with their weights first.
-#[derive(Debug, Default)]
-struct Points {
-    places: Vec<DVec3>,
-    weights: Vec<f64>,
-    seen: Vec<f64>,
 }
 
 /// Working memory of [`exchange`].
@@ -296,22 +238,23 @@ impl Integral<'_, '_> {
     /// one ratio: what the distance between orders fell by tells that ratio.
     fn raise(&mut self, mut cell: Cell) {
         cell.order += 1;
-        let value = self.integrate(&cell, RULES[cell.order]);
-        let distance = (value - cell.value).abs();
+        let before = cell.value;
+        self.apply(&mut cell);
+        let distance = (cell.value - before).abs();
         let decay = if cell.distance > 0.0 { distance / cell.distance } else { 0.0 };
         // From degrees 1 and 5 the decay is the ratio's fourth power, the next rule's error the second power of it.
         let next = if cell.order == 1 { decay.sqrt() } else { decay };
         cell.error = distance * (DECAY_ERROR * next).clamp(LEAST_DECAY, 1.0);
         if self.wanted.alone {
             // Should the present distance be small by chance, the one before tells: powers 2 to 8, and 6 to 16.
-            let size = value.max(cell.value).max(f64::MIN_POSITIVE);
+            let size = before.max(cell.value).max(f64::MIN_POSITIVE);
             let before = (cell.distance / size).min(1.0);
             let power = if cell.order == 1 { before.powi(4) } else { before.powi(2) * before.cbrt().powi(2) };
             let near = if cell.order == 1 { NEXT_DEGREE } else { 1.0 };
             cell.doubt = (near * distance).max(power * size);
         }
         cell.is_rough |= decay > SLOW_DECAY;
-        (cell.value, cell.distance) = (value, distance);
+        cell.distance = distance;
         self.keep(cell);
     }
 
@@ -363,15 +306,9 @@ impl Integral<'_, '_> {
 
     /// Integrates over a new cell and estimates the error.
     fn add(&mut self, mut cell: Cell) {
-        self.place_rule(&cell, RULES[0]);
-        let is_of_one_kind = self.look(&cell);
-        cell.value = self.weighted_sum();
-        let Points { weights, seen, .. } = &self.scratch.points;
-        let mut varied = Variation::default();
-        for (weights, seen) in weights.chunks_exact(POINTS).zip(seen.chunks_exact(POINTS)) {
-            let part = Variation::new(&std::array::from_fn(|k| weights[k] * seen[k]));
-            varied = Variation { second: varied.second + part.second, third: varied.third + part.third };
-        }
+        cell.order = 0;
+        let is_of_one_kind = self.apply(&mut cell);
+        let varied = self.scratch.points.variation();
         let both = varied.second + varied.third;
         let alone = self.wanted.alone;
         cell.distance = FIRST_DEGREE * both;
@@ -451,46 +388,12 @@ impl Integral<'_, '_> {
         is_of_one_kind
     }
 
-    /// Sum of the rule whose points have been looked at.
-    fn weighted_sum(&self) -> f64 {
-        let Points { weights, seen, .. } = &self.scratch.points;
-        weights.iter().zip(seen).map(|(weight, seen)| weight * seen).sum()
-    }
-
-    fn integrate(&mut self, cell: &Cell, rule: Rule) -> f64 {
-        self.place_rule(cell, rule);
-        self.look(cell);
-        self.weighted_sum()
-    }
-
-    /// Places the points of a rule on each quadrilateral of a fan, squeezed into triangles.
-    fn place_rule(&mut self, cell: &Cell, rule: Rule) {
-        let Scratch { points: Points { places, weights, .. }, corners, .. } = &mut *self.scratch;
-        places.clear();
-        weights.clear();
-        let corners = &corners[cell.corners.clone()];
-        for k in (1..corners.len() - 1).step_by(2) {
-            let (a, b, c) = (corners[0], corners[k], corners[k + 1]);
-            // A triangle is a quadrilateral whose first corner is doubled.
-            let d = corners.get(k + 2).copied().unwrap_or(a);
-            let (along_near, along_far) = (b - a, c - d);
-            let mut place = |s: f64, t: f64, weight: f64| {
-                let (near, far) = (a + s * along_near, d + s * along_far);
-                let along = along_near + t * (along_far - along_near);
-                places.push(near + t * (far - near));
-                weights.push(weight * along.cross(far - near).dot(self.normal));
-            };
-            match rule {
-                Rule::Eight => square_rule::for_each_point(place),
-                Rule::Gauss(n) => {
-                    let rule = gauss(n);
-                    for (s, ws) in rule.points.iter().zip(&rule.weights) {
-                        for (t, wt) in rule.points.iter().zip(&rule.weights) {
-                            place(0.5 * (1.0 + s), 0.5 * (1.0 + t), 0.25 * ws * wt);
-                        }
-                    }
-                }
-            }
-        }
+    /// Applies the cell's rule; `true` where all its points see the source in one way.
+    fn apply(&mut self, cell: &mut Cell) -> bool {
+        let Scratch { points, corners, .. } = &mut *self.scratch;
+        points.place(&corners[cell.corners.clone()], self.normal, RULES[cell.order]);
+        let is_of_one_kind = self.look(cell);
+        cell.value = self.scratch.points.sum();
+        is_of_one_kind
     }
 }
