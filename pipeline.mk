@@ -55,17 +55,17 @@ SHADE_TOOL      ?= $(BIN)shade-tool
 
 # ---- ERROR -> mesh fineness and tolerances -------------------------------------------------------------------------
 
-# The mesh decides the picture's error. The matrix tolerance bounds the worst row: on the Cornell box that row's estimate
-# is about a quarter of it and the mean row's a ninth, so twice ERROR leaves the picture as it is (3000 equal
-# elements: RMS 0.0067 to 0.0068 at the reference points with 0.0005, 0.005 and 0.02). The solver's bound is
-# on the same scale as ERROR, and its last product takes one more bounce off it. A scene of many faces needs several
-# elements for each before any can go where the light is. e is ERROR, faces their number in the OBJ.
+# The mesh decides the picture's error. The matrix tolerance bounds the worst row; on the Cornell box that row's estimate is
+# about a quarter of it. The solver's bound is on the power of all light: where it is dark single channels may be off by several
+# times as much (0.15 in a gap under a block at a bound of 0.02), and products cost next to nothing, so it gets a tenth. A
+# scene of many faces needs several elements for each before any can go where the light is. e is ERROR, faces their
+# number in the OBJ.
 define CALIBRATION
 elements = 30 / e + 11 * faces;
 if (elements < 200) elements = 200;
 if (elements > 20000) elements = 20000;
-ff_tolerance = 2 * e; if (ff_tolerance > 0.5) ff_tolerance = 0.5;
-solve_tolerance = e; if (solve_tolerance > 0.5) solve_tolerance = 0.5;
+ff_tolerance = e / 2; if (ff_tolerance > 0.5) ff_tolerance = 0.5;
+solve_tolerance = e / 10; if (solve_tolerance > 0.5) solve_tolerance = 0.5;
 shade_tolerance = e;
 endef
 
