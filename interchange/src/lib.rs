@@ -2,7 +2,7 @@
 //!
 //! The tools meet only here: a mesh, a matrix, a solution and a material table, all in one checksummed
 //! [`container`]; the scene as its author wrote it ([`scene`]); the report every stage leaves beside its output;
-//! the few command-line habits the tools share ([`tool`]); and geometry for other programs ([`foreign`]). `FORMAT.md`
+//! the few command-line habits the tools share ([`tool`]); the letters of their pictures ([`font`]); and geometry for other programs ([`foreign`]). `FORMAT.md`
 //! beside this crate specifies every byte of our own files.
 //!
 //! # Limitations
@@ -13,6 +13,7 @@ pub mod atomic_write;
 pub mod container;
 pub mod digest;
 pub mod error;
+pub mod font;
 pub mod foreign;
 pub mod grouping;
 pub mod ids;

@@ -1,8 +1,8 @@
 //! 8-bit pictures to look at: pixels, lines, text with a border that is read on any ground, and the PNG file.
 
 use crate::error::{Error, Result};
-use crate::font;
 use interchange::atomic_write::{self, Outcome};
+use interchange::font;
 use std::path::Path;
 
 /// What surrounds pictures: captions and scales stand on it.

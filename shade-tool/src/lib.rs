@@ -6,7 +6,7 @@
 //! preview ([`tone`]), for one camera or several ([`camera`], [`frames`]). [`view`] reads a picture back ([`exr_reader`])
 //! and shows it tone-mapped, in false colours ([`quantity`], [`colour_scale`]), with isolux contours ([`contours`],
 //! [`isolux`]), with the mesh ([`mesh_overlay`]) or the error of its elements ([`element_error`]); [`sheet`] puts pictures side by
-//! side; both draw on a [`canvas`] with letters of [`font`]. [`probe`] gathers irradiance at the points of a
+//! side; both draw on a [`canvas`] with letters of [`interchange::font`]. [`probe`] gathers irradiance at the points of a
 //! table or of a grid ([`grid`]). [`info`] tells what a picture holds. [`joined`] makes few sources of
 //! the solution's elements, [`bounces`] layers of light by its number of reflections. [`skips`] names what is left out.
 //!
@@ -37,7 +37,6 @@ pub mod exr_file;
 pub mod exr_reader;
 pub mod face_elements;
 pub mod facets;
-pub mod font;
 pub mod frames;
 pub mod fresnel;
 pub mod gloss;

@@ -1,8 +1,8 @@
 //! Pixels, rectangles and text, and the PNG file they become.
 
-use super::font;
 use interchange::atomic_write::{self, Outcome};
 use interchange::error::{Error, Result};
+use interchange::font;
 use std::path::Path;
 
 /// What surrounds pictures.

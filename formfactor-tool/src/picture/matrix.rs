@@ -2,9 +2,9 @@
 //! borders and kinds of the blocks, and a legend.
 
 use super::canvas::{Canvas, INK};
-use super::font;
 use super::scale::Scale;
 use interchange::error::Result;
+use interchange::font;
 use interchange::matrix::{BlockKind, Matrix};
 use std::path::Path;
 

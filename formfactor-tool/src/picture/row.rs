@@ -4,11 +4,11 @@
 //! large j is, so that neighbours of different size have alike colours, where F(i -> j) would show the mesh.
 
 use super::canvas::{Canvas, INK};
-use super::font;
 use super::scale::Scale;
 use glam::DVec3;
 use interchange::atomic_write::refuse_input;
 use interchange::error::{Error, Result};
+use interchange::font;
 use interchange::foreign::{self, Field, Format, Surface};
 use interchange::matrix::Matrix;
 use interchange::mesh::Mesh;

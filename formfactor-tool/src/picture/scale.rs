@@ -1,7 +1,7 @@
 //! Factors as colours: a logarithmic scale over whole decades, dark to bright, and its legend.
 
 use super::canvas::{Canvas, INK};
-use super::font;
+use interchange::font;
 
 /// Most decades that are told apart; smaller factors have the darkest colour.
 const MOST_DECADES: i32 = 6;
