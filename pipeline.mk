@@ -55,17 +55,17 @@ SHADE_TOOL      ?= $(BIN)shade-tool
 
 # ---- ERROR -> mesh fineness and tolerances -------------------------------------------------------------------------
 
-# The mesh decides the picture's error. The matrix tolerance bounds the worst row; on the Cornell box that row's estimate is
-# about a quarter of it. The solver's bound is on the power of all light: where it is dark single channels may be off by several
-# times as much (0.15 in a gap under a block at a bound of 0.02), and products cost next to nothing, so it gets a tenth. A
+# The mesh decides the picture's error. The matrix tolerance bounds the sum of all |errors| of the worst row; they have both
+# signs, and what they change of the light is some eight times less (measured on the Cornell box and a furnished room), so the
+# matrix gets two and a half times ERROR. The solver proves ERROR and stops its iteration at a tenth of it. A
 # scene of many faces needs several elements for each before any can go where the light is. e is ERROR, faces their
 # number in the OBJ.
 define CALIBRATION
 elements = 30 / e + 11 * faces;
 if (elements < 200) elements = 200;
 if (elements > 20000) elements = 20000;
-ff_tolerance = e / 2; if (ff_tolerance > 0.5) ff_tolerance = 0.5;
-solve_tolerance = e / 10; if (solve_tolerance > 0.5) solve_tolerance = 0.5;
+ff_tolerance = 2.5 * e; if (ff_tolerance > 0.5) ff_tolerance = 0.5;
+solve_tolerance = e; if (solve_tolerance > 0.5) solve_tolerance = 0.5;
 shade_tolerance = e;
 endef
 

@@ -22,6 +22,9 @@ pub struct Counts {
     pub by_clusters: usize,
     /// Partly occluded.
     pub occluded: usize,
+    /// Behind blockers at a loose tolerance: by the views of single points.
+    #[serde(default)]
+    pub by_points: usize,
     /// Visible parts computed for them.
     pub visible_parts: usize,
     /// Occluded pairs whose evaluations ran out.
@@ -61,6 +64,7 @@ impl Counts {
         }
         self.by_clusters += other.by_clusters;
         self.occluded += other.occluded;
+        self.by_points += other.by_points;
         self.visible_parts += other.visible_parts;
         self.exhausted += other.exhausted;
         self.computed_twice += other.computed_twice;
@@ -78,6 +82,7 @@ impl Counts {
         }
         report.count("pairs unoccluded, by whole clusters", self.by_clusters);
         report.count("pairs partly occluded", self.occluded);
+        report.count("pairs past blockers, by points of both sides", self.by_points);
         report.count("pairs partly occluded, out of evaluations", self.exhausted);
         report.count("pairs computed from both sides", self.computed_twice);
         report.count("visible parts computed", self.visible_parts);

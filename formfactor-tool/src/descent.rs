@@ -5,6 +5,7 @@ use crate::counts::Counts;
 use crate::scene::{Cluster, Scene};
 use crate::skips::{Skip, Skips};
 use crate::traversal::LeafPair;
+use geometry::body::Body;
 use geometry::occluder::separated;
 use geometry::pair::{InFront, Scratch, View, look, narrow_all};
 use geometry::shadow::Blocking;
@@ -16,8 +17,14 @@ pub trait Findings {
     /// Nothing stands between any of the rows and any of the columns; they need not see each other's front.
     fn clear(&mut self, first: &Cluster, second: &Cluster, counts: &mut Counts);
 
-    /// Something stands between two clusters. `true` where nothing more needs to be known of them.
-    fn undecided(&mut self, _: &Cluster, _: &Cluster) -> bool {
+    /// Some of the `bodies` stand between two clusters. `true` where nothing more needs to be known of them.
+    fn undecided<'a>(
+        &mut self,
+        _clusters: (&'a Cluster, &'a Cluster),
+        _bodies: impl Fn() -> Vec<&'a Body>,
+        _counts: &mut Counts,
+        _scratch: &mut Scratch<'a>,
+    ) -> bool {
         false
     }
 
@@ -44,6 +51,13 @@ pub fn descend<'a>(
     scratch.shadows.clear();
     scratch.shadows.keep_covering(!skips.has(Skip::Covered));
     let [a, b] = pair.clusters;
+    // The traversal has just found what may stand between the two: where the findings need no more, that is not asked again.
+    if a != b && !pair.blockers.is_empty() {
+        let bodies = || pair.blockers.iter().map(|&k| &scene.bodies[k as usize]).collect();
+        if findings.undecided((&scene.clusters[a], &scene.clusters[b]), bodies, counts, scratch) {
+            return;
+        }
+    }
     let mut descent = Descent { scene, skips, findings, counts };
     descent.visit(a, b, 0..0, &pair.blockers, scratch);
 }
@@ -85,7 +99,7 @@ impl<'a, F: Findings> Descent<'a, '_, F> {
             if now.is_empty() && still_pending.is_empty() && self.skips.has(Skip::EmptyShaft) {
                 self.counts.empty_shaft += pairs;
                 self.findings.clear(first, second, self.counts);
-            } else if self.findings.undecided(first, second) {
+            } else if self.is_settled(first, second, &now, &still_pending, scratch) {
                 // Looked at closely enough.
             } else if let Some(children) = children(first, second, a, b) {
                 for (c, d) in children {
@@ -96,6 +110,23 @@ impl<'a, F: Findings> Descent<'a, '_, F> {
             }
         }
         scratch.shadows.truncate(start);
+    }
+
+    /// Whether the findings need no closer look at two clusters.
+    fn is_settled(
+        &mut self,
+        first: &'a Cluster,
+        second: &'a Cluster,
+        which: &Range<usize>,
+        pending: &[u32],
+        scratch: &mut Scratch<'a>,
+    ) -> bool {
+        let cast: Vec<&'a Body> = which.clone().map(|at| scratch.shadows.body(at)).collect();
+        let bodies = || {
+            let inside = pending.iter().map(|&k| &self.scene.bodies[k as usize]);
+            cast.iter().copied().chain(inside).collect()
+        };
+        self.findings.undecided((first, second), bodies, self.counts, scratch)
     }
 
     /// Puts what stands between two clusters on the stack; `true` where one body covers all. Bodies whose inside reaches

@@ -9,6 +9,7 @@ use crate::counts::Counts;
 use crate::descent::descend;
 use crate::estimator::{Estimator, TileBuilder};
 use crate::filling::Filling;
+use crate::point_views::PointViews;
 use crate::poses::Poses;
 use crate::scene::Scene;
 use crate::sizes::occluded_sizes;
@@ -29,6 +30,8 @@ const UNOCCLUDED_SHARE: f64 = 0.3;
 const UNOCCLUDED_LOOSEST: f64 = 2e-3;
 /// Share of a row's error given to partly occluded pairs.
 const OCCLUDED_SHARE: f64 = 0.7;
+/// From this tolerance on single points may serve partly occluded pairs.
+const POINTS_TOLERANCE: f64 = 3e-3;
 /// Below this tolerance poses are not rounded: 1e-12 of a factor is to be had.
 const POSE_TOLERANCE: f64 = 1e-8;
 
@@ -47,6 +50,8 @@ pub struct Exact<'a> {
     pub(crate) clusters: Option<ClusterRule>,
     /// Near pairs by their pose, where the tolerance leaves room for a pose's rounding.
     pub(crate) poses: Option<Poses>,
+    /// Looks from single points, where the tolerance is loose enough for them.
+    pub(crate) points: Option<PointViews<'a>>,
 }
 
 /// The patches as the rules for far pairs see them.
@@ -59,14 +64,16 @@ pub(crate) struct Far {
 impl<'a> Exact<'a> {
     /// For rows within `tolerance`.
     pub fn new(scene: &'a Scene, skips: &'a Skips, pairs: &[LeafPair], tolerance: f64) -> Self {
-        let sizes = occluded_sizes(scene, skips, pairs);
+        let is_loose = tolerance >= POINTS_TOLERANCE && skips.has(Skip::PointViews);
+        let points = is_loose.then(|| PointViews::new(scene));
+        let sizes = occluded_sizes(scene, skips, pairs, is_loose);
         let occluded = sizes.iter().map(|&size| OCCLUDED_SHARE * tolerance / size.max(tolerance)).collect();
         let unoccluded = (UNOCCLUDED_SHARE * tolerance).min(UNOCCLUDED_LOOSEST);
         let far = Far { low: FarPatches::low(&scene.patches), middle: FarPatches::middle(&scene.patches) };
         let clusters = ClusterRule::new(scene, unoccluded);
         let poses =
             (tolerance >= POSE_TOLERANCE).then(|| Poses::new(unoccluded, skips.has(Skip::EqualPoses)));
-        Self { scene, skips, tolerance, unoccluded, occluded, far, clusters, poses }
+        Self { scene, skips, tolerance, unoccluded, occluded, far, clusters, poses, points }
     }
 
     fn one_way(&self, pair: &LeafPair) -> Tile {

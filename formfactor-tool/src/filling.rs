@@ -8,9 +8,11 @@ use crate::scene::Cluster;
 use crate::skips::Skip;
 use crate::traversal::LeafPair;
 use geometry::area_rule::Separation;
+use geometry::body::Body;
 use geometry::contour::Exchange;
 use geometry::occluded::Wanted;
 use geometry::pair::{InFront, Scratch};
+use geometry::point_view::PointView;
 use geometry::unoccluded::{Facing, Rule, exchange_in_front, facing, mutual_parts};
 use std::ops::Range;
 
@@ -19,31 +21,37 @@ const MOST_RELATIVE: f64 = 10.0;
 /// A partly occluded pair that may take more than this part of a row's error has to keep its own.
 const DOMINANT_SHARE: f64 = 0.02;
 /// So has one whose patches are this near (sizes over distance): what they see of each other is not smooth at a common edge.
-const NEAR: f64 = 0.7;
+pub(crate) const NEAR: f64 = 0.7;
+/// Nearer than this, and asked for less than [`LOOSE`] of their value without blockers, the first rule is not believed alone:
+/// triangles of 15 cm at a gap of 2 cm were off by five times what it stated.
+const DOUBTFUL: f64 = 1.0;
+const LOOSE: f64 = 1e-3;
+/// Such pairs are never asked less than this part of their value without blockers: their few points say little.
+const NEAR_LOOSEST: f64 = 0.02;
 /// All others may take this many times their share: most need less than a third of it.
-const OF_MANY: f64 = 1.2;
+pub(crate) const OF_MANY: f64 = 1.2;
 /// Most visible parts for one pair: a pair of whole walls behind a box needs some 10^5 for 12 digits.
 const MOST_EVALUATIONS: usize = 400_000;
 
 /// Computes what the descent finds.
 #[derive(Debug)]
 pub(crate) struct Filling<'e> {
-    exact: &'e Exact<'e>,
+    pub(crate) exact: &'e Exact<'e>,
     pair: &'e LeafPair,
     /// The tile on its way.
     pub builder: TileBuilder,
-    pending: Vec<u32>,
-    too_near: Vec<u32>,
+    pub(crate) lists: Lists,
     values: Vec<f64>,
+    pub(crate) view: PointView,
 }
 
 impl<'e> Filling<'e> {
     /// An empty tile.
     pub fn new(exact: &'e Exact<'e>, pair: &'e LeafPair, builder: TileBuilder) -> Self {
-        Self { exact, pair, builder, pending: Vec::new(), too_near: Vec::new(), values: Vec::new() }
+        Self { exact, pair, builder, lists: Lists::default(), values: Vec::new(), view: PointView::default() }
     }
 
-    fn set(&mut self, i: usize, j: usize, found: Exchange) {
+    pub(crate) fn set(&mut self, i: usize, j: usize, found: Exchange) {
         let (row, column) = (i - self.pair.rows.start, j - self.pair.columns.start);
         // Far pairs whose points lie on each other's planes sum up to rounding of either sign.
         self.builder.set(row, column, found.value.max(0.0), found.error);
@@ -99,38 +107,103 @@ impl<'e> Filling<'e> {
         }
     }
 
-    /// A row of pairs that see each other wholly: far ones together, those that are too near for a rule by the next one.
+    /// A row of pairs that see each other wholly.
     fn row_in_front(&mut self, i: usize, columns: Range<usize>, counts: &mut Counts) {
-        let relative = self.exact.unoccluded;
-        let mut pending = std::mem::take(&mut self.pending);
-        let mut too_near = std::mem::take(&mut self.too_near);
-        pending.clear();
-        pending.extend(columns.map(|j| j as u32));
-        let far = &self.exact.far;
-        for (patches, served) in [(&far.low, Rule::Low), (&far.middle, Rule::Middle)] {
+        let mut lists = std::mem::take(&mut self.lists);
+        lists.pending.clear();
+        lists.pending.extend(columns.map(|j| j as u32));
+        self.exact.row_in_front(i, &mut lists, counts, |j, found| self.set(i, j, found));
+        self.lists = lists;
+    }
+}
+
+/// Working memory of [`Exact::row_in_front`].
+#[derive(Debug, Default)]
+pub(crate) struct Lists {
+    /// Columns to compute.
+    pub pending: Vec<u32>,
+    too_near: Vec<u32>,
+}
+
+impl Exact<'_> {
+    /// The exchange factors of patch `i` with those that are `pending`, each wholly in front of it with nothing between: far
+    /// ones together, those that are too near for a rule by the next one.
+    pub(crate) fn row_in_front(
+        &self,
+        i: usize,
+        lists: &mut Lists,
+        counts: &mut Counts,
+        mut visit: impl FnMut(usize, Exchange),
+    ) {
+        let relative = self.unoccluded;
+        let Lists { pending, too_near } = lists;
+        for (patches, served) in [(&self.far.low, Rule::Low), (&self.far.middle, Rule::Middle)] {
             too_near.clear();
-            patches.factors(i, &pending, relative, |at, value, error| {
+            patches.factors(i, pending, relative, |at, value, error| {
                 if error <= relative * value {
                     counts.add_unoccluded(served);
-                    self.set(i, pending[at] as usize, Exchange { value, error });
+                    visit(pending[at] as usize, Exchange { value, error });
                 } else {
                     too_near.push(pending[at]);
                 }
             });
-            std::mem::swap(&mut pending, &mut too_near);
+            std::mem::swap(pending, too_near);
         }
-        for &j in &pending {
-            let (p, q) = (&self.exact.scene.patches[i], &self.exact.scene.patches[j as usize]);
-            let found = self.exact.poses.as_ref().and_then(|poses| poses.exchange(p, q));
+        for &j in pending.iter() {
+            let (p, q) = (&self.scene.patches[i], &self.scene.patches[j as usize]);
+            let found = self.poses.as_ref().and_then(|poses| poses.exchange(p, q));
             let (found, rule) = found.unwrap_or_else(|| exchange_in_front(p, q, relative));
             counts.add_unoccluded(rule);
-            self.set(i, j as usize, found);
+            visit(j as usize, found);
         }
-        (self.pending, self.too_near) = (pending, too_near);
+    }
+}
+
+impl Filling<'_> {
+    /// What a pair whose error must hold by itself may take of a row's error.
+    pub(crate) fn dominant(&self) -> f64 {
+        DOMINANT_SHARE * self.exact.tolerance
+    }
+
+    /// A pair behind the shadows `which`, by the adaptive rule.
+    pub(crate) fn adaptive(
+        &mut self,
+        (i, j): (usize, usize),
+        pair: &InFront<'_>,
+        which: Range<usize>,
+        counts: &mut Counts,
+        scratch: &mut Scratch<'_>,
+    ) -> Exchange {
+        let unblocked = pair.unblocked_size();
+        let allowed = &self.exact.occluded;
+        let tolerance = allowed[i].min(allowed[j]) * unblocked;
+        let (p, q) = pair.patches();
+        let share = unblocked / p.area.min(q.area) * allowed[i].max(allowed[j]);
+        let theta = Separation::new(p, q).theta;
+        let near = theta > NEAR;
+        let tolerance = if near { tolerance.min(NEAR_LOOSEST * unblocked) } else { tolerance };
+        let alone = near || share > self.dominant();
+        let tolerance = if alone { tolerance } else { OF_MANY * tolerance };
+        let doubtful = theta > DOUBTFUL && tolerance > LOOSE * unblocked;
+        let wanted = Wanted { tolerance, unblocked, alone, doubtful, most_evaluations: MOST_EVALUATIONS };
+        let (found, effort) = pair.occluded(which, wanted, scratch);
+        counts.add_occluded(effort);
+        self.set(i, j, found);
+        found
     }
 }
 
 impl Findings for Filling<'_> {
+    fn undecided<'a>(
+        &mut self,
+        clusters: (&'a Cluster, &'a Cluster),
+        bodies: impl Fn() -> Vec<&'a Body>,
+        counts: &mut Counts,
+        scratch: &mut Scratch<'a>,
+    ) -> bool {
+        self.by_points(clusters, bodies, counts, scratch)
+    }
+
     fn clear(&mut self, first: &Cluster, second: &Cluster, counts: &mut Counts) {
         if first.faces(second) && second.faces(first) && self.exact.skips.has(Skip::FarRules) {
             return self.in_front(first, second, counts);
@@ -169,17 +242,6 @@ impl Findings for Filling<'_> {
         counts: &mut Counts,
         scratch: &mut Scratch<'_>,
     ) {
-        let unblocked = pair.unblocked_size();
-        let allowed = &self.exact.occluded;
-        let tolerance = allowed[i].min(allowed[j]) * unblocked;
-        let (p, q) = pair.patches();
-        let share = unblocked / p.area.min(q.area) * allowed[i].max(allowed[j]);
-        let near = Separation::new(p, q).theta > NEAR;
-        let alone = near || share > DOMINANT_SHARE * self.exact.tolerance;
-        let tolerance = if alone { tolerance } else { OF_MANY * tolerance };
-        let wanted = Wanted { tolerance, unblocked, alone, most_evaluations: MOST_EVALUATIONS };
-        let (found, effort) = pair.occluded(which, wanted, scratch);
-        counts.add_occluded(effort);
-        self.set(i, j, found);
+        self.adaptive((i, j), pair, which, counts, scratch);
     }
 }

@@ -9,6 +9,7 @@
 
 pub mod area_form;
 pub mod block_sums;
+mod by_points;
 pub mod classical;
 pub mod closure;
 pub mod cluster_rule;
@@ -32,6 +33,7 @@ pub mod method;
 pub mod options;
 pub mod picture;
 pub mod plan;
+pub mod point_views;
 pub mod poses;
 pub mod rays;
 pub mod rows;

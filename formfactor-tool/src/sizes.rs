@@ -6,6 +6,8 @@ use crate::descent::{Findings, descend};
 use crate::scene::{Cluster, Scene};
 use crate::skips::{Skip, Skips};
 use crate::traversal::LeafPair;
+use geometry::area_rule::Separation;
+use geometry::body::Body;
 use geometry::pair::{InFront, Scratch};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -24,10 +26,31 @@ struct Sizes<'e> {
     of_columns: Vec<f64>,
 }
 
+impl Sizes<'_> {
+    /// Adds all pairs, each by the kernel between its centroids.
+    fn add_all(&mut self) {
+        for (i, of_row) in self.pair.rows.clone().zip(&mut self.of_rows) {
+            for (j, of_column) in self.pair.columns.clone().zip(&mut self.of_columns) {
+                let (p, q) = (&self.scene.patches[i], &self.scene.patches[j]);
+                let most = p.area.min(q.area);
+                let size = Separation::new(p, q).value.min(most);
+                *of_row += size;
+                *of_column += size;
+            }
+        }
+    }
+}
+
 impl Findings for Sizes<'_> {
     fn clear(&mut self, _: &Cluster, _: &Cluster, _: &mut Counts) {}
 
-    fn undecided(&mut self, first: &Cluster, second: &Cluster) -> bool {
+    fn undecided<'a>(
+        &mut self,
+        (first, second): (&'a Cluster, &'a Cluster),
+        _: impl Fn() -> Vec<&'a Body>,
+        _: &mut Counts,
+        _: &mut Scratch<'a>,
+    ) -> bool {
         let (Some(p), Some(q)) = (first.plane, second.plane) else { return false };
         if first.len() * second.len() > LOOKED_AT_TOGETHER {
             return false;
@@ -69,7 +92,9 @@ impl Findings for Sizes<'_> {
 }
 
 /// Per row the sum over its partly occluded pairs of the factors without blockers.
-pub(crate) fn occluded_sizes(scene: &Scene, skips: &Skips, pairs: &[LeafPair]) -> Vec<f64> {
+/// Where the tolerance is
+/// loose it may be too much: all pairs of two clusters count that something may stand between.
+pub(crate) fn occluded_sizes(scene: &Scene, skips: &Skips, pairs: &[LeafPair], is_loose: bool) -> Vec<f64> {
     // With nothing between them too, where they are not taken for that.
     let looked_at = |pair: &&LeafPair| !pair.blockers.is_empty() || !skips.has(Skip::EmptyShaft);
     let blocked: Vec<&LeafPair> = pairs.iter().filter(looked_at).collect();
@@ -78,6 +103,10 @@ pub(crate) fn occluded_sizes(scene: &Scene, skips: &Skips, pairs: &[LeafPair]) -
         .map_init(Scratch::default, |scratch, pair| {
             let (of_rows, of_columns) = (vec![0.0; pair.rows.len()], vec![0.0; pair.columns.len()]);
             let mut sizes = Sizes { scene, pair, of_rows, of_columns };
+            if is_loose && !pair.is_diagonal() {
+                sizes.add_all();
+                return sizes;
+            }
             descend(scene, skips, pair, &mut sizes, &mut Counts::default(), scratch);
             sizes
         })

@@ -28,6 +28,8 @@ pub enum Skip {
     EqualPoses,
     /// Well-separated pairs and clusters: cheaper rules than the contour, one interpolated kernel for all pairs of two clusters
     FarRules,
+    /// At loose tolerances: partly occluded far pairs by what a few points of both elements see, not cut along shadow lines
+    PointViews,
 }
 
 /// Which skips are on.

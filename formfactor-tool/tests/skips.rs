@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 type Polygons = Vec<Vec<[f64; 3]>>;
 
 /// All names of `--no-skip`.
-const SKIPS: [&str; 11] = [
+const SKIPS: [&str; 12] = [
     "same-plane",
     "behind",
     "behind-clusters",
@@ -28,6 +28,7 @@ const SKIPS: [&str; 11] = [
     "zero-blocks",
     "equal-poses",
     "far-rules",
+    "point-views",
 ];
 
 /// A computed matrix with its report.
@@ -359,4 +360,20 @@ fn far_rules() {
     // Squares of one size at that distance touch or nearly so.
     let near = Computed::new(&two_plates(), &[]);
     assert_eq!((far(&near), near.count(contour)), (0, 1));
+}
+
+/// At a loose tolerance points serve most pairs past the box, in fewer looks; the matrix agrees with one of a hundredth of the tolerance.
+#[test]
+fn point_views() {
+    let (by_points, adaptive) = ("pairs past blockers, by points of both sides", "pairs partly occluded");
+    let loose = ["--tolerance", "5e-2", "--precision", "f64"];
+    let on = Computed::new(&furnished(10), &loose);
+    let off = Computed::new(&furnished(10), &[&loose[..], &["--no-skip", "point-views"]].concat());
+    assert!(on.count(by_points) > 2 * on.count(adaptive), "{} {}", on.count(by_points), on.count(adaptive));
+    assert_eq!(off.count(by_points), 0);
+    assert!(on.count("visible parts computed") < off.count("visible parts computed"));
+    let tight = Computed::new(&furnished(10), &["--tolerance", "5e-4", "--precision", "f64"]);
+    assert_eq!(tight.count(by_points), 0);
+    off.assert_agrees(&on, "points against none");
+    tight.assert_agrees(&on, "points against a tight tolerance");
 }

@@ -24,9 +24,9 @@ pub struct Gatherer {
 /// Working memory of [`Gatherer::factors`].
 #[derive(Debug, Default)]
 pub struct Scratch {
-    shadows: PointShadows,
+    pub(crate) shadows: PointShadows,
     /// Stack of lists of the shadows that may touch a cluster.
-    candidates: Vec<Candidate>,
+    pub(crate) candidates: Vec<Candidate>,
     pieces: Pieces,
     corners: Vec<DVec3>,
     cut: Vec<DVec3>,
@@ -198,7 +198,12 @@ impl Gatherer {
 }
 
 /// What is seen of a polygon: above the horizon, past the candidates of the list, from the point as origin.
-fn see<'s>(corners: &[DVec3], list: Range<usize>, look: Look, scratch: &'s mut Scratch) -> &'s Polygons {
+pub(crate) fn see<'s>(
+    corners: &[DVec3],
+    list: Range<usize>,
+    look: Look,
+    scratch: &'s mut Scratch,
+) -> &'s Polygons {
     let Scratch { shadows, candidates, pieces, corners: above, cut } = scratch;
     cut.clear();
     cut.extend(corners.iter().map(|&c| c - look.point));

@@ -26,6 +26,7 @@ pub mod patch;
 pub mod plane;
 pub mod point_factor;
 pub mod point_shadow;
+pub mod point_view;
 pub mod polygon;
 pub mod quadrature;
 pub mod ray_cast;

@@ -68,6 +68,9 @@ pub struct Wanted {
     /// Whether its error must hold by itself. Among many factors of a row estimates that are too low by chance are made up
     /// for by the others.
     pub alone: bool,
+    /// Whether the patches are so near each other for their size that what one point sees says little of its neighbour: the first
+    /// rule is then believed only as far as the second one confirms it.
+    pub doubtful: bool,
     /// Most visible parts to compute.
     pub most_evaluations: usize,
 }
@@ -328,6 +331,9 @@ impl Integral<'_, '_> {
         };
         if alone {
             cell.doubt = cell.error;
+        }
+        if self.wanted.doubtful {
+            return self.raise(cell);
         }
         self.keep(cell);
     }

@@ -9,6 +9,9 @@ use crate::shadow::{Blocking, From, Set, Shadows};
 use crate::unoccluded::{self, Facing, Rule, facing, mutual_parts};
 use std::ops::Range;
 
+/// Patches whose radii differ by more than this factor: the smaller one receives, however many lines cross it.
+const MUCH_LONGER: f64 = 3.0;
+
 /// What stands between two patches that see each other's front.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum View {
@@ -90,7 +93,12 @@ impl<'p> InFront<'p> {
         // view changes more smoothly, and the other one is cut exactly anyway.
         let lines_on_p = shadows.crossings(which.clone(), From::First, &p.corners, &q.corners);
         let lines_on_q = shadows.crossings(which.clone(), From::Second, &q.corners, &p.corners);
-        let q_receives = lines_on_q < lines_on_p || (lines_on_q == lines_on_p && q.area < p.area);
+        // A patch several times as long as the other is far from even over what it sees of that: the shorter one receives.
+        let q_receives = if p.radius.max(q.radius) > MUCH_LONGER * p.radius.min(q.radius) {
+            q.radius < p.radius
+        } else {
+            lines_on_q < lines_on_p || (lines_on_q == lines_on_p && q.area < p.area)
+        };
         let (receiver, source, from) = if q_receives { (q, p, From::Second) } else { (p, q, From::First) };
         occluded::exchange(set(receiver), set(source), shadows, (which, from), wanted, occluded)
     }

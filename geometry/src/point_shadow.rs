@@ -14,6 +14,9 @@ use std::ops::Range;
 /// A point this close to a face's plane (in units of the body's size) is not in front of it: rounding of its height.
 /// Far below the distance that nodes are moved inward from a contact line.
 const POINT_ROUNDING: f64 = 1e-13;
+/// A face whose normal deviates by less than this from the one the point looks along, or its opposite, may be the one that
+/// the point lies on: corners within [`PLANARITY`] of a plane turn it by that over their distances' share of the size.
+const PARALLEL: f64 = 1e-6;
 /// Half-spaces of one shadow that are told apart; those beyond are asked always.
 const TOLD_APART: usize = u64::BITS as usize;
 
@@ -55,7 +58,7 @@ impl Cone {
 
     /// Whether two cones may share a direction: cos of the angle between against cos of the sum of the half angles. A cone
     /// of all directions meets any.
-    fn may_meet(&self, other: &Cone) -> bool {
+    pub(crate) fn may_meet(&self, other: &Cone) -> bool {
         self.cosine < 0.0
             || other.cosine < 0.0
             || self.direction.dot(other.direction) >= self.cosine * other.cosine - self.sine * other.sine
@@ -103,7 +106,7 @@ pub enum Meets {
 
 impl PointShadows {
     /// Looks at `bodies` from `point` over a plane with this unit normal; bodies beneath it cast no shadow that matters.
-    pub fn look(&mut self, point: DVec3, normal: DVec3, bodies: &[Body]) {
+    pub fn look<'b>(&mut self, point: DVec3, normal: DVec3, bodies: impl IntoIterator<Item = &'b Body>) {
         self.spaces.clear();
         self.shadows.clear();
         for body in bodies {
@@ -112,7 +115,7 @@ impl PointShadows {
                 && (height >= body.radius
                     || body.corners.iter().any(|&c| normal.dot(c - point) > PLANARITY * body.radius));
             if reaches_up {
-                self.add(body, point);
+                self.add(body, point, normal);
             }
         }
     }
@@ -122,13 +125,26 @@ impl PointShadows {
         (0..self.shadows.len() as u32).map(|shadow| Candidate { shadow, across: u64::MAX })
     }
 
-    fn add(&mut self, body: &Body, point: DVec3) {
+    fn add(&mut self, body: &Body, point: DVec3, normal: DVec3) {
         let rounding = POINT_ROUNDING * body.radius;
         self.fronts.clear();
-        self.fronts.extend(body.faces.iter().map(|face| face.distance(point) > rounding));
+        self.fronts.extend(body.faces.iter().map(|face| {
+            let height = face.distance(point);
+            // Corners of a face lie within its planarity of its plane: a point on such a face may be that far behind it.
+            let lies_on_it = height.abs() <= PLANARITY * body.radius
+                && face.normal.cross(normal).length_squared() < PARALLEL * PARALLEL;
+            match (lies_on_it, body.is_skin, body.is_flat()) {
+                (false, _, _) => height > rounding,
+                // On the skin of a sealed body it lies outside, wherever it looks.
+                (true, true, _) => face.normal.dot(body.faces[0].normal) > 0.0,
+                // A flat one is seen edge-on.
+                (true, false, true) => false,
+                (true, false, false) => face.normal.dot(normal) > 0.0,
+            }
+        }));
         if !self.fronts.contains(&true) {
-            // Inside a solid body, or on its surface and looking in: its faces hide one by one. A flat one is seen edge-on.
-            body.parts.iter().for_each(|part| self.add(part, point));
+            // Inside a solid body, or on its surface and looking in: its faces hide one by one.
+            body.parts.iter().for_each(|part| self.add(part, point, normal));
             return;
         }
         let start = self.spaces.len();
@@ -250,5 +266,24 @@ mod tests {
         assert_eq!(count(DVec3::new(0.5, 0.5, -1.0), DVec3::Z), 1);
         // On its bottom, looking in: the bottom is edge-on.
         assert_eq!(count(DVec3::new(0.5, 0.5, 0.0), DVec3::Z), 5);
+    }
+
+    /// A face whose corners are given with nine digits has points that far behind the plane of its body.
+    #[test]
+    fn a_point_on_a_face_of_few_digits_looks_past_its_own_body() {
+        let mut faces = cuboid(DVec3::ZERO, DVec3::ONE);
+        let block = bodies(&faces);
+        let top = faces.remove(1);
+        for normal in [DVec3::Z, DVec3::new(1e-9, 0.0, 1.0).normalize()] {
+            let mut shadows = PointShadows::default();
+            let point = DVec3::new(0.5, 0.5, 1.0 - 4e-10);
+            shadows.look(point, normal, &block);
+            let bounds = at(point, DVec3::new(0.5, 0.5, 3.0), 0.5);
+            let cone = Cone::around(bounds.centre, bounds.radius);
+            let meets = |candidate| shadows.narrow(candidate, &bounds, &cone);
+            assert!(shadows.all().all(|candidate| meets(candidate) == Meets::Nothing));
+            shadows.look(point, normal, &bodies(std::slice::from_ref(&top)));
+            assert_eq!(shadows.all().count(), 0);
+        }
     }
 }

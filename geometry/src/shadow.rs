@@ -156,6 +156,11 @@ impl<'a> Shadows<'a> {
         self.list.len()
     }
 
+    /// The body that casts shadow `at`.
+    pub fn body(&self, at: usize) -> &'a Body {
+        self.list[at].body
+    }
+
     /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()

@@ -174,7 +174,7 @@ impl Scene<'_> {
         }
         let options = Options {
             solver: request.solver,
-            tolerance: request.tolerance,
+            tolerance: request.solver.stops_at(request.tolerance),
             most_steps: request.most_steps,
             overshooting: request.overshooting,
             skips: request.skips.clone(),
