@@ -232,13 +232,10 @@ unsafe fn chunks_avx2<const R: usize, const K: usize, T: Entry>(
         }
         for r in rows {
             for k in 0..K {
-                for half in 0..2 {
+                for (half, sums) in partial[r - first][k].iter().enumerate() {
                     // SAFETY: four values are written to half an array of eight.
                     unsafe {
-                        _mm256_storeu_pd(
-                            lanes[r][k].as_mut_ptr().add(half * HALF),
-                            partial[r - first][k][half],
-                        );
+                        _mm256_storeu_pd(lanes[r][k].as_mut_ptr().add(half * HALF), *sums);
                     }
                 }
             }
