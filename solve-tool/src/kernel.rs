@@ -5,50 +5,19 @@
 //! f32 or f64, products and sums f64: with f32 sums the closure of a row of 1e5 entries drifts by 1e-4.
 //!
 //! The order of every sum is fixed by [`LANES`] and [`ROWS`] alone and every multiply-add of a chunk is fused, in the
-//! vector form as in the plain one, so the result has the same bits on every machine. Half of all arithmetic is saved
-//! by that; a processor without fused multiply-add (before 2013) gets the same numbers slowly.
-#![allow(unsafe_code)]
+//! vector forms ([`lanes`]) as in the plain one, so the result has the same bits on every machine. Half of all
+//! arithmetic is saved by that; a processor without fused multiply-add (before 2013) gets the same numbers slowly.
+
+mod lanes;
 
 use interchange::matrix::BlockView;
-#[cfg(target_arch = "x86_64")]
-use std::arch::x86_64::{
-    __m256d, _mm_loadu_ps, _mm256_cvtps_pd, _mm256_fmadd_pd, _mm256_loadu_pd, _mm256_set1_pd,
-    _mm256_setzero_pd, _mm256_storeu_pd,
-};
+pub(crate) use lanes::Entry;
+use lanes::{LANES, chunks};
 use std::ops::Range;
 
-/// Columns handled side by side; a row sum is this many partial sums until its end. One AVX register.
-pub(crate) const LANES: usize = 4;
-/// Rows handled together: x_j and y_j are loaded once for all of them.
-pub(crate) const ROWS: usize = 2;
-
-/// A stored matrix entry.
-pub(crate) trait Entry: Copy + Into<f64> + Send + Sync {
-    /// Four entries as f64.
-    ///
-    /// # Safety
-    /// `from` must point to four readable entries, and the processor must have AVX2.
-    #[cfg(target_arch = "x86_64")]
-    unsafe fn load(from: *const Self) -> __m256d;
-}
-
-impl Entry for f32 {
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    unsafe fn load(from: *const Self) -> __m256d {
-        // SAFETY: the caller vouches for four entries; unaligned loads are allowed.
-        _mm256_cvtps_pd(unsafe { _mm_loadu_ps(from) })
-    }
-}
-
-impl Entry for f64 {
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    unsafe fn load(from: *const Self) -> __m256d {
-        // SAFETY: the caller vouches for four entries; unaligned loads are allowed.
-        unsafe { _mm256_loadu_pd(from) }
-    }
-}
+/// Rows handled together: x_j and y_j are loaded once for all of them. Four rows of three vectors fill the 32 registers
+/// of AVX-512.
+pub(crate) const ROWS: usize = 4;
 
 /// Rows of one block that are consecutive in memory.
 #[derive(Debug, Clone, Copy)]
@@ -193,147 +162,9 @@ fn rectangle<const R: usize, const K: usize, T: Entry>(
                 tail += s * x[k][column];
                 y[k][column] += s * x_rows[r][k];
             }
-            let [a, b, c, d] = partial[r][k];
-            sums[r][k] = ((a + c) + (b + d)) + tail;
+            let [a, b, c, d, e, f, g, h] = partial[r][k];
+            sums[r][k] = (((a + e) + (c + g)) + ((b + f) + (d + h))) + tail;
         }
     }
     sums
-}
-
-/// The first `whole` columns, in chunks of [`LANES`]; returns the partial row sums.
-fn chunks<const R: usize, const K: usize, T: Entry>(
-    entries: [&[T]; R],
-    x_rows: &[[f64; K]; R],
-    x: [&[f64]; K],
-    y: &mut [&mut [f64]; K],
-    whole: usize,
-) -> [[[f64; LANES]; K]; R] {
-    debug_assert!(entries.iter().all(|e| e.len() >= whole), "a row is shorter than {whole} columns");
-    #[cfg(target_arch = "x86_64")]
-    if has_vectors() {
-        // SAFETY: the processor has AVX2 and FMA, and every slice holds `whole` values, a multiple of four.
-        return unsafe { chunks_avx2(entries, x_rows, x, y, whole) };
-    }
-    chunks_plain(entries, x_rows, x, y, whole)
-}
-
-#[cfg(target_arch = "x86_64")]
-fn has_vectors() -> bool {
-    std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
-}
-
-/// [`chunks`] as any processor can do it; the definition of the order of its sums.
-fn chunks_plain<const R: usize, const K: usize, T: Entry>(
-    entries: [&[T]; R],
-    x_rows: &[[f64; K]; R],
-    x: [&[f64]; K],
-    y: &mut [&mut [f64]; K],
-    whole: usize,
-) -> [[[f64; LANES]; K]; R] {
-    let mut partial = [[[0.0; LANES]; K]; R];
-    for at in (0..whole).step_by(LANES) {
-        for r in 0..R {
-            for lane in 0..LANES {
-                let s: f64 = entries[r][at + lane].into();
-                for k in 0..K {
-                    partial[r][k][lane] = s.mul_add(x[k][at + lane], partial[r][k][lane]);
-                    y[k][at + lane] = s.mul_add(x_rows[r][k], y[k][at + lane]);
-                }
-            }
-        }
-    }
-    partial
-}
-
-/// [`chunks`] with AVX2 and FMA: the same products and sums lane by lane, so the same bits. Written out because the
-/// compiler's own vectorisation of the plain form comes and goes with K and R.
-///
-/// # Safety
-/// The processor must have AVX2 and FMA; `whole` must be a multiple of four, and every slice at least as long.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-unsafe fn chunks_avx2<const R: usize, const K: usize, T: Entry>(
-    entries: [&[T]; R],
-    x_rows: &[[f64; K]; R],
-    x: [&[f64]; K],
-    y: &mut [&mut [f64]; K],
-    whole: usize,
-) -> [[[f64; LANES]; K]; R] {
-    let mut partial = [[_mm256_setzero_pd(); K]; R];
-    let mut x_row = [[_mm256_setzero_pd(); K]; R];
-    for r in 0..R {
-        for k in 0..K {
-            x_row[r][k] = _mm256_set1_pd(x_rows[r][k]);
-        }
-    }
-    let entries = entries.map(<[T]>::as_ptr);
-    let x = x.map(<[f64]>::as_ptr);
-    let y = y.each_mut().map(|y| y.as_mut_ptr());
-    let mut at = 0;
-    while at < whole {
-        let mut x_now = [_mm256_setzero_pd(); K];
-        let mut y_now = [_mm256_setzero_pd(); K];
-        for k in 0..K {
-            // SAFETY: at + 4 <= whole, which is within every slice.
-            unsafe {
-                x_now[k] = _mm256_loadu_pd(x[k].add(at));
-                y_now[k] = _mm256_loadu_pd(y[k].add(at));
-            }
-        }
-        for r in 0..R {
-            // SAFETY: as above, and the caller vouches for AVX2.
-            let s = unsafe { T::load(entries[r].add(at)) };
-            for k in 0..K {
-                partial[r][k] = _mm256_fmadd_pd(s, x_now[k], partial[r][k]);
-                y_now[k] = _mm256_fmadd_pd(s, x_row[r][k], y_now[k]);
-            }
-        }
-        for k in 0..K {
-            // SAFETY: as above.
-            unsafe { _mm256_storeu_pd(y[k].add(at), y_now[k]) };
-        }
-        at += LANES;
-    }
-    let mut lanes = [[[0.0; LANES]; K]; R];
-    for r in 0..R {
-        for k in 0..K {
-            // SAFETY: four values are written to an array of four.
-            unsafe { _mm256_storeu_pd(lanes[r][k].as_mut_ptr(), partial[r][k]) };
-        }
-    }
-    lanes
-}
-
-#[cfg(all(test, target_arch = "x86_64"))]
-mod tests {
-    use super::*;
-
-    /// The vector form has the bits of the plain one, for f32 and f64 entries.
-    #[test]
-    fn vector_and_plain_form_agree_to_the_bit() {
-        if !has_vectors() {
-            return;
-        }
-        const N: usize = 36;
-        let wave = |k: usize| -> Vec<f64> { (0..N).map(|i| ((i * 7 + k * 13) as f64).sin()).collect() };
-        let (a, b) = (wave(1), wave(2));
-        let (a32, b32): (Vec<f32>, Vec<f32>) = a.iter().zip(&b).map(|(&a, &b)| (a as f32, b as f32)).unzip();
-        let x = [wave(3), wave(4), wave(5)];
-        let x = x.each_ref().map(Vec::as_slice);
-        let x_rows = [[0.3, -1.7, 2.9], [1.1, 0.7, -0.2]];
-        let run = |vector: bool, wide: bool| {
-            let mut y = [wave(6), wave(7), wave(8)];
-            let mut slices = y.each_mut().map(Vec::as_mut_slice);
-            // SAFETY: AVX2 is there, and all slices hold 36 values.
-            let partial = match (vector, wide) {
-                (true, true) => unsafe { chunks_avx2([&a[..], &b], &x_rows, x, &mut slices, N) },
-                (true, false) => unsafe { chunks_avx2([&a32[..], &b32], &x_rows, x, &mut slices, N) },
-                (false, true) => chunks_plain([&a[..], &b], &x_rows, x, &mut slices, N),
-                (false, false) => chunks_plain([&a32[..], &b32], &x_rows, x, &mut slices, N),
-            };
-            (partial, y)
-        };
-        assert_eq!(run(true, true), run(false, true));
-        assert_eq!(run(true, false), run(false, false));
-    }
 }

@@ -8,16 +8,18 @@
 
 mod one_way;
 pub(crate) mod rows;
+mod scratch;
 
 use crate::kernel::{self, Entry, ROWS, Rows};
 use interchange::matrix::{Block, BlockKind, BlockView, Matrix, Values, views};
 use rayon::prelude::*;
+use scratch::Scratch;
 use std::ops::Range;
 
 /// Fewest entries worth a task: 2^16 are about 20 microseconds of work.
 const MIN_TASK_ENTRIES: u64 = 1 << 16;
-/// Most tasks: enough for even loads on some tens of cores, few enough that the copies of y stay small beside S.
-const MAX_TASKS: u64 = 64;
+/// Most tasks: enough for even loads on a dozen cores, few enough that the copies of y stay small beside S.
+const MAX_TASKS: u64 = 32;
 /// Rows of y added up at a time.
 const REDUCTION_ROWS: usize = 1024;
 
@@ -28,6 +30,7 @@ pub struct Product<'a> {
     symmetric: bool,
     views: Vec<BlockView<'a>>,
     tasks: Vec<Task>,
+    scratch: Scratch,
 }
 
 /// Consecutive rows of consecutive blocks.
@@ -73,7 +76,7 @@ impl<'a> Product<'a> {
         let stored: u64 = views.iter().map(|view| view.block.stored()).sum();
         let quota = MIN_TASK_ENTRIES.max(stored.div_ceil(MAX_TASKS));
         let tasks = partition(&views, quota);
-        Self { elements, symmetric, views, tasks }
+        Self { elements, symmetric, views, tasks, scratch: Scratch::default() }
     }
 
     /// The same product for vectors that are 0 outside `sources`, of which only the `wanted` rows are asked for; the
@@ -185,7 +188,7 @@ impl<'a> Product<'a> {
     ) -> [Vec<f64>; K] {
         debug_assert!(x.iter().all(|x| x.len() == self.elements), "vectors of another length");
         let partial: Vec<[Vec<f64>; K]> = self.tasks.par_iter().map(run).collect();
-        std::array::from_fn(|k| {
+        let y = std::array::from_fn(|k| {
             let mut y = vec![0.0; self.elements];
             y.par_chunks_mut(REDUCTION_ROWS).enumerate().for_each(|(chunk, y)| {
                 let rows = chunk * REDUCTION_ROWS..chunk * REDUCTION_ROWS + y.len();
@@ -197,11 +200,13 @@ impl<'a> Product<'a> {
                 }
             });
             y
-        })
+        });
+        self.scratch.give_back(partial.into_iter().flatten());
+        y
     }
 
     fn run<const K: usize>(&self, task: &Task, x: [&[f64]; K]) -> [Vec<f64>; K] {
-        let mut y = std::array::from_fn(|_| vec![0.0; task.span.len()]);
+        let mut y = std::array::from_fn(|_| self.scratch.zeros(task.span.len()));
         for piece in &task.pieces {
             let view = &self.views[piece.block as usize];
             match view.values {

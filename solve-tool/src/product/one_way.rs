@@ -11,7 +11,7 @@ const LANES: usize = 8;
 impl Product<'_> {
     /// What a task adds to S x, on its span.
     pub(super) fn run_one_way<const K: usize>(&self, task: &Task, x: [&[f64]; K]) -> [Vec<f64>; K] {
-        let mut y = std::array::from_fn(|_| vec![0.0; task.span.len()]);
+        let mut y = std::array::from_fn(|_| self.scratch.zeros(task.span.len()));
         self.for_rows(task, |row, column, entries| {
             for k in 0..K {
                 let x = &x[k][column..];
@@ -26,7 +26,7 @@ impl Product<'_> {
 
     /// What a task adds to the transpose of S times x, on its span.
     pub(super) fn run_transposed(&self, task: &Task, x: &[f64]) -> [Vec<f64>; 1] {
-        let mut y = vec![0.0; task.span.len()];
+        let mut y = self.scratch.zeros(task.span.len());
         self.for_rows(task, |row, column, entries| {
             let sums = &mut y[column - task.span.start..];
             sums.iter_mut().take(entries.len()).enumerate().for_each(|(j, y)| *y += entries.get(j) * x[row]);
