@@ -5,6 +5,7 @@
 #   make -f pipeline.mk ERROR=0.01                        a finer picture
 #   make -f pipeline.mk -j 4 SHARDS=4                     the matrix in four parts side by side
 #   make -f pipeline.mk PASSES=2                          elements where the first solution is worst
+#   make -f pipeline.mk report                            all on one page, out/name.html
 #   make -f pipeline.mk test                              the tests
 #   make -f pipeline.mk clean SCENE=... OUT=...           removes what was made for this scene
 #
@@ -246,6 +247,28 @@ $(P).exr.made: $(P).sol $(P).mesh $(P).materials $(TOML) $(P).exr.flags $(call n
 	$(call stage,$(SHADE_TOOL) render $(P).sol --mesh $(P).mesh -o $(P).exr --png $(P).png $(shade_flags))
 $(P).exr $(P).png: $(P).exr.made ; +
 
+# Report: all of it on one page, name.html, which needs no network; with a solution that has bounds, and pictures made for it.
+.PHONY: report
+report: $(P).html
+$(P).page.sol: $(P).sol
+	$(SOLVE_TOOL) solve $(P).ff --mesh $(P).mesh -o $@ $(solve_flags) $(call unless,$(SOLVE_FLAGS),--bounds,--bounds) || [ $$? -eq 3 ]
+	@touch $@
+$(P).page.false-colour.png: $(P).exr
+	$(SHADE_TOOL) view false-colour $(P).exr -o $@
+	@touch $@
+$(P).page.mesh.png: $(P).exr
+	$(SHADE_TOOL) view mesh $(P).exr --mesh $(P).mesh -o $@
+	@touch $@
+$(P).page.matrix.png: $(P).ff
+	$(FORMFACTOR_TOOL) picture $(P).ff -o $@
+	@touch $@
+$(P).html: $(P).exr $(P).png $(P).sol $(TOML) $(addprefix $(P).page.,sol false-colour.png mesh.png matrix.png) \
+    $(call program,SHADE_TOOL)
+	$(SHADE_TOOL) page $(P).sol --mesh $(P).mesh --matrix $(P).ff --picture $(P).exr --bounds $(P).page.sol \
+	  --figure picture=$(P).png --figure false-colour=$(P).page.false-colour.png --figure mesh=$(P).page.mesh.png \
+	  --figure matrix=$(P).page.matrix.png $(TOML:%=--camera %) -o $@
+	@touch $@
+
 # Flags: written first, and only where the text is another one (or the file is missing).
 stages := materials mesh ff sol exr $(if $(twice),first.mesh first.ff first.sol)
 same    = $(and $(findstring <$(strip $1)>,<$(strip $2)>),$(findstring <$(strip $2)>,<$(strip $1)>))
@@ -289,6 +312,8 @@ outputs := $(materials_outputs) $(P).mesh $(P).ff $(P).sol $(P).exr $(P).png \
 hidden  := $(dir $(P)).$(notdir $(P))
 clean:
 	rm -f $(outputs) $(outputs:%=%.report.json)
+	rm -f $(P).html $(addprefix $(P).page.,sol sol.report.json false-colour.png mesh.png matrix.png)
+	rm -f $(addprefix $(P).page.,$(addsuffix .report.json,false-colour.png mesh.png matrix.png))
 	rm -f $(foreach s,$(stages) first.mesh first.ff first.sol,$(addprefix $(P).$s,.flags .made .made.start .made.new))
 	rm -f $(foreach f,$(outputs:$(P)%=$(hidden)%),$f.*.partial $f.report.json.*.partial $f.*.mode)
 	rm -f $(foreach e,.ff .ff.report.json .ff.made .ff.made.start .ff.made.new,$(P).[1-9]*of[1-9]*$e)

@@ -12,7 +12,7 @@
 //! | `.rad` | materials, or with colours each polygon's own glow | 17 digits |
 //! | `.vs3` | triangles and quadrilaterals, groups, emittances | 17 digits |
 
-mod base64;
+pub mod base64;
 pub mod glb;
 pub mod obj;
 pub mod ply;

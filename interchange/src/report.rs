@@ -2,13 +2,13 @@
 
 use crate::atomic_write;
 use crate::error::Result;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// What a stage did, how long it took, what it skipped and how sure it is.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Report {
     /// Name of the tool.
     pub tool: String,
@@ -29,7 +29,7 @@ pub struct Report {
 }
 
 /// One phase of a stage.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Phase {
     /// Name.
     pub name: String,
@@ -75,6 +75,16 @@ impl Report {
         let message = message.into();
         tracing::warn!("{message}");
         self.warnings.push(message);
+    }
+
+    /// Reads a report that a stage left.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is no report.
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| crate::Error::io(path, "read", e))?;
+        let message = |e| format!("not a report ({e}); run the stage again that wrote it");
+        serde_json::from_str(&text).map_err(|e| crate::Error::whole(path, message(e)))
     }
 
     /// Where the report of `output` lies: `s.ff.report.json` for `s.ff`.

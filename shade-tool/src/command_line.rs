@@ -9,6 +9,7 @@ use crate::frames::{Frame, frames};
 use crate::layers::Layer;
 use crate::lit_scene::LitScene;
 use crate::local_picture::LocalRenderer;
+use crate::page::{self, PageArguments};
 use crate::picture::Picture;
 use crate::refined::Scheme;
 use crate::render::{Quality, Renderer};
@@ -34,8 +35,9 @@ const LARGEST_SIDE: u32 = 1 << 16;
 const LARGEST_PICTURE: u64 = 1 << 28;
 
 /// Lines to try, in `--help` and the manual page.
-const EXAMPLES: [&str; 4] = [
+const EXAMPLES: [&str; 5] = [
     "shade-tool render box.sol --mesh box.mesh -o box.exr --png box.png --camera tests/scenes/cornell_blocks.toml",
+    "shade-tool page box.sol --mesh box.mesh --matrix box.ff --picture box.exr --figure picture=box.png -o box.html",
     "shade-tool info box.exr",
     "shade-tool compare box.exr box.exr --max 0",
     "shade-tool probe box.sol --mesh box.mesh --points points.csv -o lit.csv",
@@ -63,6 +65,8 @@ pub enum Command {
     /// Look at a picture in another way, without rendering it again: PNG from EXR
     #[command(subcommand)]
     View(Box<View>),
+    /// Put a whole run on a page: one HTML file with a 3-D view, pictures, errors, times and provenance
+    Page(Box<PageArguments>),
     /// Put pictures side by side with one exposure: a contact sheet
     Sheet(SheetArguments),
     /// Show by how much two pictures differ
@@ -273,9 +277,11 @@ impl Arguments {
             Command::Sheet(sheet) => {
                 return sheet.usage().or_else(|message| bad(ErrorKind::WrongNumberOfValues, message));
             }
-            Command::Probe(_) | Command::Compare(_) | Command::Pages { .. } | Command::Info(_) => {
-                return Ok(());
-            }
+            Command::Probe(_)
+            | Command::Page(_)
+            | Command::Compare(_)
+            | Command::Pages { .. }
+            | Command::Info(_) => return Ok(()),
         };
         if render.tone.given() && render.png.is_none() {
             let message = "--exposure and --curve are for the preview: give --png";
@@ -311,6 +317,7 @@ impl Arguments {
             Command::Render(arguments) => run_render(arguments, &self.common)?,
             Command::Probe(arguments) => run_probe(arguments, &self.common)?,
             Command::View(view) => view.run()?,
+            Command::Page(arguments) => page::run(arguments)?,
             Command::Sheet(arguments) => arguments.run()?,
             Command::Compare(arguments) => run_compare(arguments)?,
             Command::Pages { prefix } => pages::write(Arguments::command(), prefix)?,

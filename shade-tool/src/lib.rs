@@ -7,7 +7,7 @@
 //! and shows it tone-mapped, in false colours ([`quantity`], [`colour_scale`]), with isolux contours ([`contours`],
 //! [`isolux`]), with the mesh ([`mesh_overlay`]) or the error of its elements ([`element_error`]); [`sheet`] puts pictures side by
 //! side; both draw on a [`canvas`] with letters of [`interchange::font`]. [`probe`] gathers irradiance at the points of a
-//! table or of a grid ([`grid`]). [`info`] tells what a picture holds. [`joined`] makes few sources of
+//! table or of a grid ([`grid`]). [`page`] puts a whole run into one HTML file. [`info`] tells what a picture holds. [`joined`] makes few sources of
 //! the solution's elements, [`bounces`] layers of light by its number of reflections. [`skips`] names what is left out.
 //!
 //! Besides the solution there are the models of direct light that came before it ([`shading`], [`local_picture`]): emitters as
@@ -52,6 +52,7 @@ pub mod mesh_overlay;
 pub mod node_places;
 pub mod nodes;
 pub mod on_surface;
+pub mod page;
 pub mod phong;
 pub mod picture;
 pub mod points;

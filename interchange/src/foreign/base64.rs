@@ -1,9 +1,9 @@
-//! Bytes as text (RFC 4648, section 4), for the arrays of VTK's XML files.
+//! Bytes as text (RFC 4648, section 4), for the arrays of VTK's XML files and of report pages.
 
 const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
 /// The text of some bytes, padded.
-pub(super) fn encode(bytes: &[u8]) -> String {
+pub fn encode(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for chunk in bytes.chunks(3) {
         let mut three = [0; 3];

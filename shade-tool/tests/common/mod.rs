@@ -42,10 +42,15 @@ pub fn cube() -> Mesh {
 
 /// A folder with `s.mesh`, `s.materials` and `s.sol`: radiosity 1, 2, 4 everywhere, in balance with the materials.
 pub fn furnace() -> tempfile::TempDir {
+    furnace_of(cube())
+}
+
+/// The same with another mesh of six elements and two materials.
+pub fn furnace_of(mesh: Mesh) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let written = |tool: &str| Provenance::new(tool, "test");
-    cube().write(&at("s.mesh"), written("mesh-tool")).unwrap();
+    mesh.write(&at("s.mesh"), written("mesh-tool")).unwrap();
     let white = Material { diffuse: [1.0; 3], ..Material::default() };
     let radiance = [1.0, 2.0, 4.0].map(|b| b / std::f64::consts::PI);
     let lamp = Material { radiance, ..Material::default() };
