@@ -2,7 +2,7 @@
 //!
 //! [`render`] finds the surface that each sample of a pixel sees ([`visible`]), gathers irradiance at the nodes of the
 //! facets that are seen ([`facets`], [`nodes`], [`node_places`]), for lamps and surfaces apart ([`light`]), cuts facets where
-//! interpolation is not good enough ([`refined`], [`refined_parts`], [`piece`]),
+//! interpolation is not good enough ([`refined`], [`refined_parts`], [`piece`], [`judge`]),
 //! interpolates ([`interpolation`]) and writes radiance and layers ([`layers`]) as OpenEXR ([`exr_file`]) and a tone-mapped
 //! preview ([`tone`]), for one camera or several ([`camera`], [`frames`]). [`view`] reads a picture back ([`exr_reader`])
 //! and shows it tone-mapped, in false colours ([`quantity`], [`colour_scale`]), with isolux contours ([`contours`],
@@ -36,8 +36,10 @@ pub mod element_error;
 pub mod error;
 pub mod exr_file;
 pub mod exr_reader;
+pub mod extent;
 pub mod face_elements;
 pub mod facets;
+pub mod flag_values;
 pub mod frames;
 pub mod fresnel;
 pub mod gloss;
@@ -46,6 +48,7 @@ pub mod info;
 pub mod interpolation;
 pub mod isolux;
 pub mod joined;
+pub mod judge;
 pub mod layers;
 pub mod light;
 pub mod lit_scene;

@@ -1,8 +1,9 @@
 //! Direct and indirect light over the facets of a picture, each refined for itself.
 
+use crate::judge::{Goal, Proof, Scheme};
 use crate::light::{Irradiance, Part};
 use crate::nodes::NodeRadiosity;
-use crate::refined::{Found, Goal, Proof, RefinedFacets, Scheme};
+use crate::refined::{Found, RefinedFacets};
 use crate::visible::VisibleSurface;
 use glam::DVec2;
 use interchange::ids::ElementId;
@@ -19,7 +20,7 @@ const INDIRECT_PIXELS: f64 = 50.0;
 const MOST_PIXELS: f64 = 8.0;
 /// How far the middle of an edge may lie from the line between its ends, in tolerances, when a parabola goes through all
 /// three. A smooth field's third derivative decides what the parabola is off by; measured in a furnished room at 0.04, 1 and
-/// 2 give the same error to two digits, 3 one that is larger by a quarter.
+/// 2 give the same error to 3 %, 3 one that is larger by a quarter.
 const TRUST: f64 = 2.0;
 
 /// Both parts.

@@ -3,14 +3,16 @@
 //! picture has no noise and is the same for any number of threads.
 
 use crate::camera::Camera;
+use crate::extent::{Extent, extend};
 use crate::interpolation::corner_weights;
+use crate::judge::Scheme;
 use crate::layers::{Layer, NOTHING, Pixel, Values};
 use crate::light::Part;
 use crate::lit_scene::LitScene;
 use crate::nodes::NodeRadiosity;
 use crate::picture::Picture;
 use crate::receiver::{Parts, total};
-use crate::refined::{Found, Scheme};
+use crate::refined::Found;
 use crate::refined_parts::RefinedParts;
 use crate::visible::{Seen, VisibleSurface};
 use geometry::gather::Scratch;
@@ -190,43 +192,6 @@ fn append_layers(all: &mut Vec<(Layer, Values)>, layers: &[Layer], pixels: &[Pix
         match all.get_mut(k) {
             Some((_, values_before)) => values_before.append(values),
             None => all.push((layer, values)),
-        }
-    }
-}
-
-/// The part of the picture in which a facet is seen.
-#[derive(Debug, Clone, Copy)]
-struct Extent {
-    low: [u32; 2],
-    high: [u32; 2],
-}
-
-impl Default for Extent {
-    fn default() -> Extent {
-        Extent { low: [u32::MAX; 2], high: [0; 2] }
-    }
-}
-
-impl Extent {
-    fn is_seen(&self) -> bool {
-        self.low[0] <= self.high[0]
-    }
-
-    /// Pixels from end to end, along rows or columns. A chair's leg is long, however few pixels it covers.
-    fn pixels(&self) -> f64 {
-        f64::from((0..2).fold(0, |most, c| most.max(self.high[c] - self.low[c])) + 1)
-    }
-}
-
-/// Extends the facets by samples of rows from `top` on.
-fn extend(extents: &mut [Extent], seen: &[Seen], per_pixel: usize, (width, top): (usize, usize)) {
-    for (pixel, seen) in seen.chunks(per_pixel).enumerate() {
-        let place = [(pixel % width) as u32, (top + pixel / width) as u32];
-        for sample in seen {
-            if let Seen::Surface(element, ..) = sample {
-                let Extent { low, high } = &mut extents[element.index()];
-                (*low, *high) = ([0, 1].map(|c| low[c].min(place[c])), [0, 1].map(|c| high[c].max(place[c])));
-            }
         }
     }
 }
