@@ -5,7 +5,7 @@ use crate::compare::Difference;
 use crate::error::Result;
 use crate::exr_file::{self, Fit, Label, Precision};
 use crate::facets::Drawn;
-use crate::flag_values::{angle, ends_in, ends_in_either, film, size, vector};
+use crate::flag_values::{Interpolation, angle, ends_in, ends_in_either, film, size, vector};
 use crate::frames::{Frame, frames};
 use crate::judge::Scheme;
 use crate::layers::Layer;
@@ -20,7 +20,7 @@ use crate::tone::ToneArguments;
 use crate::view::{View, tell_exposure};
 use crate::{TOOL, VERSION, bounces, grid, info, points, probe, skips};
 use clap::error::ErrorKind;
-use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use glam::DVec3;
 use interchange::atomic_write::refuse_input;
 use interchange::provenance::Provenance;
@@ -168,39 +168,6 @@ pub struct RenderArguments {
     /// Exposure and curve of the preview.
     #[command(flatten)]
     pub tone: ToneArguments,
-}
-
-/// How light is interpolated over elements.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Interpolation {
-    /// By the tolerance: quadratic from 0.005 on, gather below
-    Auto,
-    /// The solution's own value all over each element
-    Constant,
-    /// Between gathered corners, cut where that is not good enough
-    Linear,
-    /// Between gathered corners and middles of edges, cut where that is not good enough
-    Quadratic,
-    /// Quadratic where that is good, gathered at every sample elsewhere
-    Gather,
-}
-
-/// Tolerance from which on `auto` interpolates. Linear interpolation is never chosen: on the Cornell box it takes longer
-/// and is farther off at 0.01, 0.02 and 0.05.
-const AUTO_QUADRATIC: f64 = 0.005;
-
-impl Interpolation {
-    /// The scheme at a tolerance; `None` for constant elements.
-    fn scheme(self, tolerance: f64) -> Option<Scheme> {
-        match self {
-            Interpolation::Constant => None,
-            Interpolation::Linear => Some(Scheme::Linear),
-            Interpolation::Quadratic => Some(Scheme::Quadratic),
-            Interpolation::Gather => Some(Scheme::Gather),
-            Interpolation::Auto if tolerance >= AUTO_QUADRATIC => Some(Scheme::Quadratic),
-            Interpolation::Auto => Some(Scheme::Gather),
-        }
-    }
 }
 
 /// Flags of `probe`.

@@ -160,3 +160,28 @@ impl<const N: usize> Gathering<N> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::test_scenes::cube;
+
+    /// A bounded solution may be below zero in the dark. Lamps are what emits, and both parts add up to the radiosity.
+    #[test]
+    fn elements_slightly_below_zero_are_no_lamps() {
+        let mut scene = cube(2);
+        scene.materials[0].diffuse = [0.5; 3];
+        scene.materials[0].radiance = [0.0; 3];
+        scene.radiosity = (0..24).map(|k| [if k % 2 == 0 { -1e-6 } else { 1.0 }; 3]).collect();
+        let light = Light::new(&scene, Opening::EXACT);
+        assert_eq!((light.lamps.sources, light.surfaces.sources), (0, 24));
+        let receiver = Receiver { point: DVec3::new(0.3, 1e-3, 0.4), normal: DVec3::Y, face: None };
+        let scratch = &mut Scratch::default();
+        let [direct, .., indirect] = light.irradiance(&receiver, scratch);
+        let want = light.part(Part::Indirect, &receiver, scratch)[2];
+        assert!(
+            direct == 0.0 && indirect == want && (0.1..0.9).contains(&want),
+            "{direct} {indirect} {want}"
+        );
+    }
+}
