@@ -12,6 +12,9 @@ const LEAF: usize = 4;
 const GAP: f64 = 0.25;
 /// Extent of directions compared with that of places: walls of a room part before they are halved.
 const DIRECTIONS: f64 = 4.0;
+/// Sine of the angle between planes that count as parallel: what rounding leaves of faces that are. A point aside by a
+/// distance d may be in front of such a face by this part of d, and sees as small a part of the hemisphere in it.
+const PARALLEL: f64 = 1e-14;
 /// Elements whose edges are tried as directions of a flat cluster's box.
 const TRIED: usize = 6;
 
@@ -53,6 +56,8 @@ pub(crate) struct Node {
     pub(crate) radius: f64,
     /// Where all elements lie in one plane and look the same way.
     pub(crate) plane: Option<Plane>,
+    /// Where all elements look the same way: a plane behind all of them. What is not in front of it sees backs only.
+    pub(crate) front: Option<Plane>,
     /// Where they also fill a convex polygon: its corners, among the tree's.
     hull: Range<usize>,
 }
@@ -206,7 +211,31 @@ impl ElementTree {
             boxed([DVec3::X, DVec3::Y, DVec3::Z])
         };
         let radius = axes.iter().map(|axis| axis.length_squared()).sum::<f64>().sqrt();
-        Node { range, second_child: 0, middle, axes, radius, plane: is_flat.then_some(plane), hull: 0..0 }
+        let front = if is_flat { Some(plane) } else { self.hindmost(&members, &corners) };
+        Node {
+            range,
+            second_child: 0,
+            middle,
+            axes,
+            radius,
+            plane: is_flat.then_some(plane),
+            front,
+            hull: 0..0,
+        }
+    }
+
+    /// The plane of the member that lies farthest back, where all look the same way to the planarity of faces.
+    fn hindmost(&self, members: &[usize], corners: &[DVec3]) -> Option<Plane> {
+        let normal = self.elements[*members.first()?].plane.normal;
+        let is_parallel = |&k: &usize| {
+            let other = self.elements[k].plane.normal;
+            normal.dot(other) > 0.0 && normal.cross(other).length() <= PARALLEL
+        };
+        if !members.iter().all(is_parallel) {
+            return None;
+        }
+        let back = corners.iter().copied().min_by(|&a, &b| normal.dot(a).total_cmp(&normal.dot(b)))?;
+        Some(Plane { normal, origin: back })
     }
 }
 

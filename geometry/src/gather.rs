@@ -125,7 +125,7 @@ impl Gatherer {
         let node = &self.tree.nodes[index];
         let bounds = Bounds { centre: node.middle - look.point, axes: node.axes, radius: node.radius };
         let (low, high) = bounds.along(look.normal);
-        let turned_away = node.plane.is_some_and(|plane| plane.distance(look.point) <= 0.0);
+        let turned_away = node.front.is_some_and(|front| front.distance(look.point) <= 0.0);
         if high <= 0.0 || turned_away || !taker.wants(index) {
             return;
         }
@@ -134,6 +134,12 @@ impl Gatherer {
         let start = scratch.candidates.len();
         let cone = Cone::around(bounds.centre, bounds.radius);
         for at in list {
+            if node.plane.is_none() {
+                if scratch.shadows.may_touch(scratch.candidates[at], &cone) {
+                    scratch.candidates.push(scratch.candidates[at]);
+                }
+                continue;
+            }
             match scratch.shadows.narrow(scratch.candidates[at], &bounds, &cone) {
                 Meets::Nothing => {}
                 Meets::Part(candidate) => scratch.candidates.push(candidate),

@@ -37,23 +37,32 @@ struct Shadow {
     cone: Cone,
 }
 
-/// A cone of directions that holds all of a ball: within an angle, given by its cosine and sine, of `direction`.
+/// A cone of directions that holds all of a ball: within an angle, given by its cosine and sine, of `direction`; cut off
+/// before and behind the ball.
 #[derive(Debug, Clone, Copy)]
 pub struct Cone {
     direction: DVec3,
     cosine: f64,
     sine: f64,
+    nearest: f64,
+    farthest: f64,
 }
 
 impl Cone {
     /// Cone around a ball whose centre is seen at `to_centre`; all directions where the point is inside.
     pub fn around(to_centre: DVec3, radius: f64) -> Cone {
         let distance = to_centre.length();
+        let (nearest, farthest) = (distance - radius, distance + radius);
         if radius >= distance {
-            return Cone { direction: DVec3::ZERO, cosine: -1.0, sine: 0.0 };
+            return Cone { direction: DVec3::ZERO, cosine: -1.0, sine: 0.0, nearest, farthest };
         }
         let sine = radius / distance;
-        Cone { direction: to_centre / distance, cosine: (1.0 - sine * sine).sqrt(), sine }
+        Cone { direction: to_centre / distance, cosine: (1.0 - sine * sine).sqrt(), sine, nearest, farthest }
+    }
+
+    /// Whether a part of this cone's ball may lie behind one of the other's.
+    fn may_be_behind(&self, other: &Cone) -> bool {
+        other.nearest <= self.farthest && other.may_meet(self)
     }
 
     /// Whether two cones may share a direction: cos of the angle between against cos of the sum of the half angles. A cone
@@ -163,10 +172,16 @@ impl PointShadows {
         self.shadows.push(Shadow { spaces: start..self.spaces.len(), radius: body.radius, cone });
     }
 
+    /// Whether the shadow of a candidate may touch a ball whose cone this is, by balls alone: all that is worth asking for
+    /// clusters in several planes, which most shadows touch.
+    pub fn may_touch(&self, candidate: Candidate, cone: &Cone) -> bool {
+        cone.may_be_behind(&self.shadows[candidate.shadow as usize].cone)
+    }
+
     /// How the shadow of a candidate for a larger cluster meets a box inside that cluster; `cone` is one around the box.
     pub fn narrow(&self, candidate: Candidate, bounds: &Bounds, cone: &Cone) -> Meets {
         let shadow = &self.shadows[candidate.shadow as usize];
-        if !shadow.cone.may_meet(cone) {
+        if !cone.may_be_behind(&shadow.cone) {
             return Meets::Nothing;
         }
         let tolerance = PLANARITY * (shadow.radius + bounds.radius);

@@ -203,9 +203,7 @@ fn read(path: &Path) -> Result<Planes> {
 }
 
 fn exr_planes(path: &Path) -> Result<Planes> {
-    crate::info::check_kind(path)?;
-    let refused = |error: exr::error::Error| Error::Picture { path: path.into(), found: error.to_string() };
-    let image = exr::image::read::read_all_flat_layers_from_file(path).map_err(refused)?;
+    let image = crate::exr_reader::read_all(path)?;
     let mut planes = Planes { size: [0, 0], channels: BTreeMap::new() };
     for layer in &image.layer_data {
         planes.size = [layer.size.0, layer.size.1];

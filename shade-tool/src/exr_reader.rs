@@ -10,12 +10,22 @@ use crate::layers::{Layer, Values};
 use crate::picture::Picture;
 use clap::ValueEnum;
 use exr::meta::attribute::AttributeValue;
-use exr::prelude::FlatSamples;
+use exr::prelude::{AnyChannels, FlatSamples, Image, Layers};
 use glam::DVec3;
 use interchange::digest::Digest;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+
+/// All layers and channels of a picture, as samples of the file's own kind.
+pub type StoredImage = Image<Layers<AnyChannels<FlatSamples>>>;
+
+/// Reads everything a picture holds.
+pub fn read_all(path: &Path) -> Result<StoredImage> {
+    check_kind(path)?;
+    let refused = |error: exr::error::Error| Error::Picture { path: path.into(), found: error.to_string() };
+    exr::image::read::read_all_flat_layers_from_file(path).map_err(refused)
+}
 
 /// A picture with what its file says of it.
 #[derive(Debug, Clone)]
@@ -35,12 +45,9 @@ pub struct StoredPicture {
 impl StoredPicture {
     /// Reads a picture. Layers of other programs are left out.
     pub fn read(path: &Path) -> Result<StoredPicture> {
-        check_kind(path)?;
-        let refused =
-            |error: exr::error::Error| Error::Picture { path: path.into(), found: error.to_string() };
-        let image = exr::image::read::read_all_flat_layers_from_file(path).map_err(refused)?;
+        let image = read_all(path)?;
         let named = |layer: &exr::prelude::Layer<_>| -> BTreeMap<String, FlatSamples> {
-            let channels: &exr::prelude::AnyChannels<FlatSamples> = &layer.channel_data;
+            let channels: &AnyChannels<FlatSamples> = &layer.channel_data;
             let name =
                 |c: &exr::prelude::AnyChannel<_>| String::from_utf8_lossy(c.name.as_slice()).into_owned();
             // Channels with fewer samples than pixels are of no use here.

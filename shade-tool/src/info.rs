@@ -1,6 +1,7 @@
 //! What a picture holds: size, channels with their ranges, attributes.
 
 use crate::error::{Error, Result};
+use crate::exr_reader::read_all;
 use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, Text};
 use exr::prelude::FlatSamples;
@@ -50,10 +51,9 @@ pub struct ChannelInfo {
 
 /// Reads the picture; files of other stages are refused by the name of the tool that shows them.
 pub fn read(path: &Path) -> Result<PictureInfo> {
-    check_kind(path)?;
+    let image = read_all(path)?;
     let refused = |error: exr::error::Error| Error::Picture { path: path.into(), found: error.to_string() };
     let meta = MetaData::read_from_file(path, false).map_err(refused)?;
-    let image = exr::image::read::read_all_flat_layers_from_file(path).map_err(refused)?;
     let layers = image.layer_data.iter().map(|layer| LayerInfo {
         name: layer.attributes.layer_name.as_ref().map(utf8),
         size: [layer.size.0, layer.size.1],

@@ -6,7 +6,6 @@
 //! steps at their borders: a wall gathered from its neighbour shows no facets of it.
 
 use crate::lit_scene::LitScene;
-use crate::receiver::Parts;
 use geometry::plane::Plane;
 use geometry::polygon;
 use geometry::source_tree::Slope;
@@ -15,13 +14,15 @@ use interchange::ids::{ElementId, FaceId};
 
 /// A part of an element with less than this part of its cell's area is a rounding of its border.
 const SLIVER: f64 = 1e-12;
+/// A cell that its elements leave open by less than this part of its area is filled.
+const FILLED: f64 = 1e-9;
+/// Part of the tolerance that is kept where it is dark.
+const DARKEST: f64 = 0.1;
 /// Single elements may be off by so many times what the cell may be off in the mean.
 const OUTLIER: f64 = 3.0;
 /// Values that few elements take are fitted by any line: they have to lie within so many times the tolerance.
 const FEW: usize = 6;
 const FEW_RANGE: f64 = 10.0;
-/// More cells than so many times the elements are not worth it: the elements themselves serve.
-const MOST_CELLS: usize = 4;
 /// Halvings of a piece in a row.
 const DEEPEST: u32 = 40;
 /// A plane is not fitted to places that lie on a line to this part.
@@ -29,13 +30,42 @@ const ON_LINE: f64 = 1e-6;
 
 /// Convex sources.
 #[derive(Debug, Default)]
-pub struct Sources {
+pub struct Sources<const N: usize> {
     /// Corners, counter-clockwise seen from the front.
     pub polygons: Vec<Vec<DVec3>>,
     /// Strength at the centroid.
-    pub strengths: Vec<Parts>,
+    pub strengths: Vec<[f64; N]>,
     /// Change of strength, where there is any.
-    pub slopes: Vec<Option<Slope<6>>>,
+    pub slopes: Vec<Option<Slope<N>>>,
+}
+
+/// What a cell's elements may deviate from it.
+#[derive(Debug, Clone, Copy)]
+struct Tolerance {
+    /// Where it is as bright as in the mean, and brighter.
+    full: f64,
+    mean: f64,
+}
+
+impl Tolerance {
+    fn new<const N: usize>(scene: &LitScene, strengths: &[[f64; N]], full: f64) -> Tolerance {
+        let (mut power, mut area) = (0.0, 0.0);
+        for (corners, strength) in scene.sources.iter().zip(strengths) {
+            let own = polygon::area(corners);
+            power += own * mean_of(strength);
+            area += own;
+        }
+        Tolerance { full, mean: if area > 0.0 { power / area } else { 0.0 } }
+    }
+
+    /// Less in the dark: what is dark there has its light from its neighbours.
+    fn of(&self, brightness: f64) -> f64 {
+        self.full * if self.mean > 0.0 { (brightness / self.mean).clamp(DARKEST, 1.0) } else { 1.0 }
+    }
+}
+
+fn mean_of<const N: usize>(strength: &[f64; N]) -> f64 {
+    strength.iter().sum::<f64>() / N as f64
 }
 
 /// A part of an element within a cell.
@@ -53,22 +83,41 @@ impl Part {
     }
 }
 
-impl Sources {
-    fn push(&mut self, polygon: Vec<DVec3>, strength: Parts, slope: Option<Slope<6>>) {
+impl<const N: usize> Sources<N> {
+    fn push(&mut self, polygon: Vec<DVec3>, strength: [f64; N], slope: Option<Slope<N>>) {
         self.polygons.push(polygon);
         self.strengths.push(strength);
         self.slopes.push(slope);
     }
 
+    fn truncate(&mut self, count: usize) {
+        self.polygons.truncate(count);
+        self.strengths.truncate(count);
+        self.slopes.truncate(count);
+    }
+
+    /// Without what sends nothing.
+    pub fn lit(self) -> Sources<N> {
+        let Sources { polygons, strengths, slopes } = self;
+        let mut lit = Sources::default();
+        for ((polygon, strength), slope) in polygons.into_iter().zip(strengths).zip(slopes) {
+            if strength != [0.0; N] || slope.is_some() {
+                lit.push(polygon, strength, slope);
+            }
+        }
+        lit
+    }
+
     /// Every element as it is.
-    pub fn elements(scene: &LitScene, strengths: &[Parts]) -> Sources {
+    pub fn elements(scene: &LitScene, strengths: &[[f64; N]]) -> Sources<N> {
         let slopes = vec![None; strengths.len()];
         Sources { polygons: scene.sources.clone(), strengths: strengths.to_vec(), slopes }
     }
 
     /// Elements joined where their strengths are linear within `tolerance`, W m^-2, in the mean.
-    pub fn joined(scene: &LitScene, strengths: &[Parts], tolerance: f64) -> Sources {
+    pub fn joined(scene: &LitScene, strengths: &[[f64; N]], tolerance: f64) -> Sources<N> {
         let mesh = &scene.mesh;
+        let tolerance = Tolerance::new(scene, strengths, tolerance);
         let mut of_side: Vec<(u32, u32, usize)> = Vec::new();
         for (drawn, &source) in scene.source_of.iter().enumerate() {
             let face = mesh.element_face(ElementId::new(drawn)).0;
@@ -96,7 +145,7 @@ impl Sources {
             let meshed = area(&mut members.iter().map(|&k| &scene.sources[k]));
             // Elements that were moved off their face by more than rounding are not described by its pieces.
             let same_area = (area(&mut found.polygons.iter()) - meshed).abs() <= 1e-6 * meshed;
-            if same_area && found.polygons.len() <= MOST_CELLS * members.len() {
+            if same_area {
                 all.polygons.append(&mut found.polygons);
                 all.strengths.append(&mut found.strengths);
                 all.slopes.append(&mut found.slopes);
@@ -108,13 +157,13 @@ impl Sources {
     }
 }
 
-fn join_piece(
+fn join_piece<const N: usize>(
     scene: &LitScene,
     members: &[usize],
     corners: Vec<DVec3>,
-    strengths: &[Parts],
-    tolerance: f64,
-    out: &mut Sources,
+    strengths: &[[f64; N]],
+    tolerance: Tolerance,
+    out: &mut Sources<N>,
 ) {
     let Some(plane) = Plane::of_polygon(&corners) else { return };
     let mut parts = Vec::new();
@@ -132,23 +181,28 @@ fn join_piece(
 }
 
 /// Makes a cell one source if its parts allow it, else halves it across its longest extent.
-fn join(
+fn join<const N: usize>(
     cell: Vec<DVec3>,
     mut parts: Vec<Part>,
     plane: &Plane,
-    strengths: &[Parts],
-    tolerance: f64,
+    strengths: &[[f64; N]],
+    tolerance: Tolerance,
     depth: u32,
-    out: &mut Sources,
+    out: &mut Sources<N>,
 ) {
     let area: f64 = parts.iter().map(|part| part.area).sum();
     parts.retain(|part| part.corners.len() >= 3 && part.area > SLIVER * area);
     let Some(first) = parts.first() else { return };
-    if parts.iter().all(|part| strengths[part.element] == strengths[first.element]) {
+    // A cell may reach under something that lies on the face, where there are no elements: that is cut off.
+    let is_filled = area >= polygon::area(&cell) * (1.0 - FILLED);
+    if is_filled && parts.iter().all(|part| strengths[part.element] == strengths[first.element]) {
         out.push(cell, strengths[first.element], None);
         return;
     }
-    if let Some((mean, slope)) = fit(&parts, plane, strengths, tolerance) {
+    let brightness =
+        parts.iter().map(|part| part.area * mean_of(&strengths[part.element])).sum::<f64>() / area;
+    let own = tolerance.of(brightness);
+    if is_filled && let Some((mean, slope)) = fit(&parts, plane, strengths, own) {
         out.push(cell, mean, Some(slope));
         return;
     }
@@ -179,17 +233,28 @@ fn join(
         polygon::clip_by(corners, |p| sign * (axis.dot(p - origin) - at), &mut kept);
         kept
     };
+    let before = out.polygons.len();
     for sign in [1.0, -1.0] {
         let parts = parts.iter().map(|part| Part::new(part.element, half(&part.corners, sign))).collect();
         join(half(&cell, sign), parts, plane, strengths, tolerance, depth - 1, out);
     }
+    // Where halves are no fewer the elements serve, as in penumbrae, whose elements follow the light.
+    if out.polygons.len() - before >= parts.len() {
+        out.truncate(before);
+        parts.into_iter().for_each(|part| out.push(part.corners, strengths[part.element], None));
+    }
 }
 
 /// Strength at the centroid and slope of the plane through the parts' strengths, if they lie on it.
-fn fit(parts: &[Part], plane: &Plane, strengths: &[Parts], tolerance: f64) -> Option<(Parts, Slope<6>)> {
+fn fit<const N: usize>(
+    parts: &[Part],
+    plane: &Plane,
+    strengths: &[[f64; N]],
+    tolerance: f64,
+) -> Option<([f64; N], Slope<N>)> {
     let area: f64 = parts.iter().map(|part| part.area).sum();
     let centroid = parts.iter().map(|part| part.area * part.centroid).sum::<DVec3>() / area;
-    let mean: Parts = std::array::from_fn(|n| {
+    let mean: [f64; N] = std::array::from_fn(|n| {
         parts.iter().map(|part| part.area * strengths[part.element][n]).sum::<f64>() / area
     });
     let (u, v) = plane.axes();
@@ -203,7 +268,7 @@ fn fit(parts: &[Part], plane: &Plane, strengths: &[Parts], tolerance: f64) -> Op
     }
     let determinant = uu * vv - uv * uv;
     let is_plane = determinant > ON_LINE * (uu + vv) * (uu + vv);
-    let slope: Slope<6> = std::array::from_fn(|n| {
+    let slope: Slope<N> = std::array::from_fn(|n| {
         let (mut us, mut vs) = (0.0, 0.0);
         for part in parts {
             let (x, y) = place(part);
@@ -224,7 +289,7 @@ fn fit(parts: &[Part], plane: &Plane, strengths: &[Parts], tolerance: f64) -> Op
     for part in parts {
         let aside = part.centroid - centroid;
         let (mut miss, mut range): (f64, f64) = (0.0, 0.0);
-        for n in 0..6 {
+        for n in 0..N {
             let from_mean = strengths[part.element][n] - mean[n];
             miss = miss.max((from_mean - slope[n].dot(aside)).abs());
             range = range.max(from_mean.abs());
@@ -242,11 +307,11 @@ mod tests {
     use super::*;
     use crate::test_scenes::cube;
 
-    fn ramp(scene: &LitScene, of: impl Fn(DVec3) -> f64) -> Vec<Parts> {
+    fn ramp(scene: &LitScene, of: impl Fn(DVec3) -> f64) -> Vec<[f64; 6]> {
         scene.sources.iter().map(|corners| [of(polygon::centroid(corners)); 6]).collect()
     }
 
-    fn power(sources: &Sources) -> f64 {
+    fn power(sources: &Sources<6>) -> f64 {
         sources.polygons.iter().zip(&sources.strengths).map(|(p, s)| polygon::area(p) * s[0]).sum()
     }
 

@@ -1,7 +1,8 @@
 //! Radiosity to pictures and points: the last stage of the pipeline.
 //!
 //! [`render`] finds the surface that each sample of a pixel sees ([`visible`]), gathers irradiance at the nodes of the
-//! facets that are seen ([`facets`], [`nodes`], [`node_places`]), cuts facets where interpolation is not good enough ([`refined`]),
+//! facets that are seen ([`facets`], [`nodes`], [`node_places`]), for lamps and surfaces apart ([`light`]), cuts facets where
+//! interpolation is not good enough ([`refined`], [`refined_parts`], [`piece`], [`judge`]),
 //! interpolates ([`interpolation`]) and writes radiance and layers ([`layers`]) as OpenEXR ([`exr_file`]) and a tone-mapped
 //! preview ([`tone`]), for one camera or several ([`camera`], [`frames`]). [`view`] reads a picture back ([`exr_reader`])
 //! and shows it tone-mapped, in false colours ([`quantity`], [`colour_scale`]), with isolux contours ([`contours`],
@@ -35,8 +36,10 @@ pub mod element_error;
 pub mod error;
 pub mod exr_file;
 pub mod exr_reader;
+pub mod extent;
 pub mod face_elements;
 pub mod facets;
+pub mod flag_values;
 pub mod frames;
 pub mod fresnel;
 pub mod gloss;
@@ -45,7 +48,9 @@ pub mod info;
 pub mod interpolation;
 pub mod isolux;
 pub mod joined;
+pub mod judge;
 pub mod layers;
+pub mod light;
 pub mod lit_scene;
 pub mod local_picture;
 pub mod mesh_overlay;
@@ -55,11 +60,13 @@ pub mod on_surface;
 pub mod page;
 pub mod phong;
 pub mod picture;
+pub mod piece;
 pub mod points;
 pub mod probe;
 pub mod quantity;
 pub mod receiver;
 pub mod refined;
+pub mod refined_parts;
 pub mod render;
 pub mod shading;
 pub mod sheet;

@@ -1,10 +1,11 @@
 //! Irradiance at the nodes that a picture needs, gathered at the node instead of averaged from the elements around it; and
 //! the linear interpolation between them. Radiosity is B = E + rho H.
 
+use crate::light::{Irradiance, Light, Part};
 use crate::lit_scene::LitScene;
 use crate::node_places::{NodePlace, NodePlaces, corner_nodes};
-use crate::receiver::{Light, Parts, Receiver, total};
-use crate::refined::Corner;
+use crate::piece::Corner;
+use crate::receiver::{Parts, Receiver};
 use geometry::gather::Scratch;
 use geometry::source_tree::Opening;
 use glam::DVec3;
@@ -45,7 +46,7 @@ pub struct Ends {
     /// Places.
     pub points: [DVec3; 3],
     /// Irradiance.
-    pub corners: [Corner; 3],
+    pub corners: [Corner<Parts>; 3],
 }
 
 /// How many nodes were treated how.
@@ -106,24 +107,22 @@ impl<'a> NodeRadiosity<'a> {
 
         // Gather.
         begin(whole.len() + edges.len());
-        let this = &*self;
-        let gathered = |scratch: &mut Scratch, element: ElementId, receiver: &Receiver| {
-            let irradiance = this.gathered(element, receiver, scratch);
-            done();
-            irradiance
+        let at = |receivers: &[Receiver]| -> Vec<Parts> {
+            let direct = self.light.part_at(Part::Direct, receivers, || {});
+            let indirect = self.light.part_at(Part::Indirect, receivers, &done);
+            direct.iter().zip(indirect).map(|(&[a, b, c], [d, e, f])| [a, b, c, d, e, f]).collect()
         };
-        let at_nodes: Vec<Parts> = whole
-            .par_iter()
-            .map_init(Scratch::default, |scratch, (_, element, receiver)| {
-                gathered(scratch, *element, receiver)
-            })
-            .collect();
-        let at_edges: Vec<Parts> = edges
-            .par_iter()
-            .map_init(Scratch::default, |scratch, (_, element, receiver)| {
-                gathered(scratch, *element, receiver)
-            })
-            .collect();
+        let receivers = whole.iter().map(|&(.., receiver)| receiver);
+        let receivers: Vec<Receiver> =
+            receivers.chain(edges.iter().map(|&(.., receiver)| receiver)).collect();
+        let mut at_nodes = at(&receivers);
+        let mut at_edges = at_nodes.split_off(whole.len());
+        // Black surfaces show nothing of it.
+        for (irradiance, (_, element, _)) in at_edges.iter_mut().zip(&edges) {
+            if !self.reflects(*element) {
+                *irradiance = Parts::default();
+            }
+        }
 
         // Keep.
         for ((node, ..), irradiance) in whole.iter().zip(at_nodes) {
@@ -140,11 +139,27 @@ impl<'a> NodeRadiosity<'a> {
         if self.reflects(element) { self.light.irradiance(receiver, scratch) } else { Parts::default() }
     }
 
+    /// One part of it.
+    pub fn part(
+        &self,
+        part: Part,
+        element: ElementId,
+        receiver: &Receiver,
+        scratch: &mut Scratch,
+    ) -> Irradiance {
+        if self.reflects(element) { self.light.part(part, receiver, scratch) } else { [0.0; 3] }
+    }
+
     /// Radiosity of the element's material under an irradiance: B = E + rho H.
-    pub fn radiosity(&self, element: ElementId, irradiance: &Parts) -> [f64; 3] {
-        let (material, irradiance) = (self.scene.material(element), total(irradiance));
+    pub fn radiosity(&self, element: ElementId, irradiance: &Irradiance) -> [f64; 3] {
+        let material = self.scene.material(element);
         let exitance = material.exitance();
         std::array::from_fn(|c| exitance[c] + material.diffuse[c] * irradiance[c])
+    }
+
+    /// Reflectance of the element's material.
+    pub fn reflectance(&self, element: ElementId) -> [f64; 3] {
+        self.scene.material(element).diffuse
     }
 
     /// The sources, for their counters.
@@ -168,7 +183,7 @@ impl<'a> NodeRadiosity<'a> {
         let (nodes, vertices) =
             (<[NodeId; 3]>::try_from(nodes).ok()?, <[VertexId; 3]>::try_from(corners).ok()?);
         let value = |k: usize| match self.states[nodes[k].index()] {
-            State::Whole(value) => Some(Corner { before: value, after: value }),
+            State::Whole(value) => Some(Corner::whole(value)),
             State::Split => {
                 let towards = |end: usize| self.on_edges.get(&(nodes[k], vertices[end % 3])).copied();
                 Some(Corner { before: towards(k + 2)?, after: towards(k + 1)? })
@@ -248,6 +263,7 @@ fn beside(k: usize, n: usize) -> [usize; 2] {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::receiver::total;
     use crate::test_scenes::cube;
 
     fn furnace(n: usize) -> LitScene {
@@ -275,7 +291,7 @@ mod tests {
             for element in scene.mesh.element_ids() {
                 for weights in [corner(0), corner(1), corner(2), corner(3), [0.4, 0.3, 0.2, 0.1]] {
                     let want = [0.5 + 0.5, 0.25 * 2.0, 3.0];
-                    let got = nodes.radiosity(element, &nodes.interpolate(element, &weights));
+                    let got = nodes.radiosity(element, &total(&nodes.interpolate(element, &weights)));
                     for (got, want) in got.iter().zip(want) {
                         assert!((got - want).abs() < 1e-9, "{element:?} of {n}: {got}, want {want}");
                     }
@@ -357,6 +373,6 @@ mod tests {
         nodes.gather(&[ElementId(3)], |points| assert_eq!(points, 0), || {});
         assert_eq!(nodes.counts, Counts { black: 4, unseen: 20, ..Counts::default() });
         let dark = nodes.interpolate(ElementId(3), &[0.25; 4]);
-        assert_eq!(nodes.radiosity(ElementId(3), &dark), [0.5, 0.0, 0.0]);
+        assert_eq!(nodes.radiosity(ElementId(3), &total(&dark)), [0.5, 0.0, 0.0]);
     }
 }

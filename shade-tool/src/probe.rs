@@ -3,10 +3,10 @@
 use crate::coarser::coarser_radiosity;
 use crate::error::Result;
 use crate::joined::Sources;
+use crate::light::Gathering;
 use crate::lit_scene::LitScene;
 use crate::on_surface::Surfaces;
 use crate::points::{COLUMNS, ProbePoint};
-use crate::receiver::Light;
 use geometry::gather::Scratch;
 use geometry::source_tree::Opening;
 use interchange::report::Report;
@@ -60,7 +60,7 @@ pub fn probe(
             .collect()
     });
     bar.finish_and_clear();
-    light.count(report);
+    light.count("sources_", report);
     for (c, name) in ADDED.iter().enumerate().filter(|_| !points.is_empty()) {
         let mean = probed.iter().map(|p| p.irradiance[c]).sum::<f64>() / points.len() as f64;
         report.estimate(&format!("mean_{name}"), mean);
@@ -72,12 +72,12 @@ pub fn probe(
 }
 
 /// The solution's radiosity, and that of a coarser one.
-fn light(scene: &LitScene, opening: Opening) -> Light {
+fn light(scene: &LitScene, opening: Opening) -> Gathering<6> {
     let coarse = coarser_radiosity(scene);
     let both =
         |(fine, coarse): (&[f64; 3], &[f64; 3])| [fine[0], fine[1], fine[2], coarse[0], coarse[1], coarse[2]];
     let strengths: Vec<[f64; 6]> = scene.radiosity.iter().zip(&coarse).map(both).collect();
-    Light::with_sources(scene, Sources::elements(scene, &strengths), opening)
+    Gathering::new(scene, Sources::elements(scene, &strengths), opening)
 }
 
 /// Emitted power over area, brightest channel, W m^-2: what the solver's bound is a part of.

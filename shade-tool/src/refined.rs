@@ -1,23 +1,25 @@
 //! Facets cut further where interpolation is not good enough: an edge on which gathered irradiance differs from the
 //! interpolated one by more than the tolerance makes the facets on both of its sides into four each, and so on, down to a
-//! pixel.
+//! pixel. Each part of the light has facets of its own.
 //!
-//! Linear: the middle of the edge is asked. Quadratic (six nodes, as Lischinski, Tampieri & Greenberg 1992 use them): its two
-//! quarter points. Gathering: as quadratic, and the middle of the facet besides; what is not resolved at a pixel's size
-//! is left to be gathered at every sample. So irradiance is reused where it is smooth, as Ward, Rubinstein & Clear
-//! 1988 do, but the error of reuse is measured instead of guessed from distances, and only shadow borders and corners cost.
+//! Linear: the middle of the edge is asked. Quadratic: its two quarter points; or, for light that is known to be smooth, the
+//! middle, whose distance from the line is several times what the parabola through it is off by. Gathering: as
+//! quadratic, and the middle of the facet besides; what is not resolved at a pixel's size is left to be gathered at every
+//! sample. So irradiance is reused where it is smooth, as Ward, Rubinstein & Clear 1988 do, but the error of reuse is
+//! measured instead of guessed from distances, and only shadow borders and corners cost.
 //!
 //! The decision belongs to the edge, so neighbours agree along it: an edge that is not cut stays as it is on both sides,
 //! and its halves are never asked again.
 
-use crate::interpolation::{corner_weights, quadratic_weights};
+use crate::interpolation::corner_weights;
+use crate::judge::{Goal, Judge, Other, Scheme};
+use crate::light::{Irradiance, Part};
 use crate::nodes::{Ends, NodeRadiosity};
-use crate::receiver::{Parts, Receiver, limit_from_inside};
+use crate::piece::{EdgeKey, Piece, blend, key, quarter};
+use crate::receiver::Receiver;
 use crate::visible::VisibleSurface;
-use geometry::gather::Scratch;
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use interchange::ids::ElementId;
-use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 
 /// Cuts in a row; 2^8 is more than any picture's pixels across a facet that matter.
@@ -28,57 +30,17 @@ const DARK: f64 = 0.05;
 /// Part of a deviation that cutting in two leaves where nothing is measured: halves of a quarter for smooth fields, doubled
 /// for fields with a kink.
 const LEFT_AFTER_CUT: f64 = 0.5;
-
-/// How irradiance is interpolated over a facet.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scheme {
-    /// Between the corners.
-    Linear,
-    /// Between the corners and the middles of the edges.
-    Quadratic,
-    /// Quadratic where that is good, gathered at the sample where not.
-    Gather,
-}
-
-/// Irradiance at a corner, in the limit along the edges to the corner before and to the one after it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Corner {
-    /// Along the edge that comes from the corner before.
-    pub before: Parts,
-    /// Along the edge that goes to the corner after.
-    pub after: Parts,
-}
-
-impl Corner {
-    fn whole(value: Parts) -> Corner {
-        Corner { before: value, after: value }
-    }
-}
-
-/// A triangle over which irradiance is interpolated, or cut into four.
-#[derive(Debug, Clone)]
-struct Piece {
-    element: ElementId,
-    ids: [u32; 3],
-    points: [DVec3; 3],
-    places: [DVec2; 3],
-    corners: [Corner; 3],
-    /// Of edges 0-1, 1-2 and 2-0; used by quadratic schemes.
-    middles: [Parts; 3],
-    /// Index of the first of four children; 0 for none (piece 0 is nobody's child).
-    children: usize,
-    /// Largest deviation of radiosity from what is interpolated, where asked.
-    error: f64,
-    /// Interpolation is known or feared to be off by more than the tolerance.
-    unresolved: bool,
-}
+/// The middle of an edge.
+const MIDDLE: f64 = 0.5;
+/// The middle of a facet.
+const CENTRE: [f64; 3] = [1.0 / 3.0; 3];
 
 /// What is known of an edge.
 #[derive(Debug, Clone, Copy)]
 struct Edge {
     /// Number of the node in its middle.
     id: u32,
-    middle: Parts,
+    middle: Irradiance,
     /// Part of an edge that interpolation serves.
     straight: bool,
 }
@@ -88,14 +50,14 @@ struct Edge {
 struct Verdict {
     flagged: bool,
     deviation: f64,
-    quarters: [Parts; 2],
+    quarters: Option<[Irradiance; 2]>,
 }
 
 /// What a facet gives at a place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Found {
     /// Irradiance.
-    pub irradiance: Parts,
+    pub irradiance: Irradiance,
     /// Estimated error of radiosity, W m^-2.
     pub error: f64,
     /// Where to gather instead, if interpolation does not serve.
@@ -117,52 +79,20 @@ pub struct RefinedFacets {
     pub cut: usize,
     /// Triangles that are left to be gathered at every sample, or to be off by more than the tolerance.
     pub unresolved: usize,
-}
-
-type EdgeKey = (u32, u32);
-
-fn key(a: u32, b: u32) -> EdgeKey {
-    (a.min(b), a.max(b))
-}
-
-fn blend(terms: &[(f64, &Parts)]) -> Parts {
-    std::array::from_fn(|c| terms.iter().map(|(weight, parts)| weight * parts[c]).sum())
-}
-
-/// What is asked of the facets.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Goal {
-    /// Interpolation.
-    pub scheme: Scheme,
-    /// Largest deviation as part of the radiosity.
-    pub tolerance: f64,
-}
-
-/// Gathers at points of pieces, and judges what is found.
-struct Judge<'a> {
-    nodes: &'a NodeRadiosity<'a>,
-    goal: Goal,
-    dark: f64,
-}
-
-impl Judge<'_> {
-    /// Deviation of radiosity, largest channel, and whether it is above the tolerance.
-    fn deviation(&self, element: ElementId, found: &Parts, interpolated: &Parts) -> (f64, bool) {
-        let (b, other) = (self.nodes.radiosity(element, found), self.nodes.radiosity(element, interpolated));
-        let deviations: [f64; 3] = std::array::from_fn(|c| (b[c] - other[c]).abs());
-        let flagged = (0..3).any(|c| deviations[c] > self.goal.tolerance * b[c].max(self.dark));
-        (deviations.into_iter().fold(0.0, f64::max), flagged)
-    }
+    /// Facets that were too small to be asked.
+    pub small: usize,
 }
 
 impl RefinedFacets {
-    /// Cuts the triangular `facets` (each with the pixels it covers), whose nodes are gathered, until no edge deviates
-    /// by more than the tolerance or a triangle is below a pixel. `done` is called after each gathered point.
+    /// Cuts the triangular `facets` (each with its length in pixels), whose nodes are gathered, until no edge deviates
+    /// by more than the tolerance or a triangle is short. `other` is the light that makes up the whole;
+    /// `done` is called after each gathered point.
     pub fn new(
         nodes: &NodeRadiosity<'_>,
         surface: &VisibleSurface,
         facets: &[(ElementId, f64)],
         goal: Goal,
+        other: Other<'_>,
         done: impl Fn() + Sync,
     ) -> RefinedFacets {
         let mut refined = RefinedFacets {
@@ -174,39 +104,40 @@ impl RefinedFacets {
             gathered: 0,
             cut: 0,
             unresolved: 0,
+            small: 0,
         };
         let mut active: Vec<(usize, f64)> = Vec::new();
         for &(element, pixels) in facets {
-            if let Some(piece) = root(nodes, surface, element) {
+            if let Some(piece) = root(nodes, surface, element, goal.part) {
                 refined.roots.insert(element, refined.pieces.len());
-                if nodes.reflects(element) {
+                if pixels <= goal.pixels {
+                    refined.small += 1;
+                } else if nodes.reflects(element) {
                     active.push((refined.pieces.len(), pixels));
                 }
                 refined.pieces.push(piece);
             }
         }
-        let judge = Judge { nodes, goal, dark: DARK * refined.mean_radiosity(nodes) };
+        let judge =
+            Judge { nodes, goal, other, dark: DARK * refined.mean_radiosity(nodes, other), done: &done };
         for depth in 0..=DEEPEST {
             // What was cut and is not asked again stays doubtful.
-            let small = |pixels: f64| pixels <= 1.0 || depth == DEEPEST;
-            for &(piece, _) in active.iter().filter(|&&(_, pixels)| depth > 0 && small(pixels)) {
+            let small = |pixels: f64| pixels <= goal.pixels || depth == DEEPEST;
+            for &(piece, _) in active.iter().filter(|&&(_, pixels)| small(pixels)) {
                 refined.pieces[piece].unresolved = true;
                 refined.unresolved += 1;
             }
-            if goal.scheme == Scheme::Linear {
-                active.retain(|&(_, pixels)| !small(pixels));
-            }
-            refined.gather_middles(&judge, &active, &done);
             active.retain(|&(_, pixels)| !small(pixels));
             if active.is_empty() {
                 break;
             }
-            let verdicts = refined.verdicts(&judge, &active, &done);
-            let centres = refined.centres(&judge, &active, &verdicts, &done);
+            refined.gather_middles(&judge, &active);
+            let verdicts = refined.verdicts(&judge, &active);
+            let centres = refined.centres(&judge, &active, &verdicts);
             let mut children = Vec::new();
             for (&(piece, pixels), centre) in active.iter().zip(centres) {
                 if let Some(first) = refined.cut(piece, &verdicts, centre) {
-                    children.extend((first..first + 4).map(|child| (child, 0.25 * pixels)));
+                    children.extend((first..first + 4).map(|child| (child, 0.5 * pixels)));
                 }
             }
             active = children;
@@ -217,10 +148,13 @@ impl RefinedFacets {
         refined
     }
 
-    fn mean_radiosity(&self, nodes: &NodeRadiosity<'_>) -> f64 {
-        let corners = self.pieces.iter().flat_map(|p| p.corners.iter().map(|c| (p.element, c.before)));
-        let sum: f64 = corners.map(|(e, value)| nodes.radiosity(e, &value).iter().sum::<f64>()).sum();
-        sum / (9 * self.pieces.len().max(1)) as f64
+    fn mean_radiosity(&self, nodes: &NodeRadiosity<'_>, other: Other<'_>) -> f64 {
+        let of_piece = |piece: &Piece| -> f64 {
+            let other = other(piece.element, piece.place(&CENTRE));
+            let mean = piece.linear(&CENTRE);
+            nodes.radiosity(piece.element, &std::array::from_fn(|c| mean[c] + other[c])).iter().sum()
+        };
+        self.pieces.iter().map(of_piece).sum::<f64>() / (3 * self.pieces.len().max(1)) as f64
     }
 
     /// Each edge of the active triangles that `wanted` asks for once, on its first triangle.
@@ -242,15 +176,13 @@ impl RefinedFacets {
     }
 
     /// Gathers the middles of edges that have none yet.
-    fn gather_middles(&mut self, judge: &Judge<'_>, active: &[(usize, f64)], done: &(impl Fn() + Sync)) {
+    fn gather_middles(&mut self, judge: &Judge<'_>, active: &[(usize, f64)]) {
         let edges = self.edges_of(active, |key| !self.edges.contains_key(key));
-        let pieces = &self.pieces;
-        let gather = |scratch: &mut Scratch, &(_, (piece, k)): &(EdgeKey, (usize, usize))| {
-            let piece = &pieces[piece];
-            done();
-            judge.nodes.gathered(piece.element, &piece.receiver_on_edge(k, 0.5), scratch)
+        let middle = |&(_, (piece, k)): &(EdgeKey, (usize, usize))| {
+            let piece: &Piece = &self.pieces[piece];
+            (piece, Piece::on_edge(k, MIDDLE))
         };
-        let found: Vec<Parts> = edges.par_iter().map_init(Scratch::default, gather).collect();
+        let found = judge.gathered(edges.iter().map(middle));
         self.gathered += found.len();
         for ((key, _), middle) in edges.into_iter().zip(found) {
             self.insert(key, middle, false);
@@ -258,7 +190,7 @@ impl RefinedFacets {
     }
 
     /// Keeps an edge unless it is known.
-    fn insert(&mut self, key: EdgeKey, middle: Parts, straight: bool) {
+    fn insert(&mut self, key: EdgeKey, middle: Irradiance, straight: bool) {
         let id = self.next_id;
         let mut is_new = false;
         self.edges.entry(key).or_insert_with(|| {
@@ -269,51 +201,48 @@ impl RefinedFacets {
     }
 
     /// Which edges of the active triangles interpolation does not serve.
-    fn verdicts(
-        &mut self,
-        judge: &Judge<'_>,
-        active: &[(usize, f64)],
-        done: &(impl Fn() + Sync),
-    ) -> HashMap<EdgeKey, Verdict> {
+    fn verdicts(&mut self, judge: &Judge<'_>, active: &[(usize, f64)]) -> HashMap<EdgeKey, Verdict> {
         let open = |key: &EdgeKey| self.edges.get(key).is_some_and(|edge| !edge.straight);
         let edges = self.edges_of(active, open);
-        let (pieces, known) = (&self.pieces, &self.edges);
-        let judged = |scratch: &mut Scratch, &(key, (piece, k)): &(EdgeKey, (usize, usize))| {
-            let piece = &pieces[piece];
-            let edge = known.get(&key)?;
-            let (start, end) = (piece.corners[k].after, piece.corners[(k + 1) % 3].before);
-            if judge.goal.scheme == Scheme::Linear {
+        let mut found = Vec::new();
+        if judge.asks_quarters() {
+            let quarters = |&(_, (piece, k)): &(EdgeKey, (usize, usize))| {
+                let piece: &Piece = &self.pieces[piece];
+                [0.25, 0.75].map(|at| (piece, Piece::on_edge(k, at)))
+            };
+            found = judge.gathered(edges.iter().flat_map(quarters));
+            self.gathered += found.len();
+        }
+        let mut verdicts = HashMap::new();
+        for (at, (key, (piece, k))) in edges.into_iter().enumerate() {
+            let piece = &self.pieces[piece];
+            let Some(edge) = self.edges.get_mut(&key) else { continue };
+            let (start, end) = piece.ends(k);
+            if !judge.asks_quarters() {
                 let linear = blend(&[(0.5, &start), (0.5, &end)]);
-                let (deviation, flagged) = judge.deviation(piece.element, &edge.middle, &linear);
-                return Some((Verdict { flagged, deviation, quarters: [linear; 2] }, linear, 0));
+                let (deviation, flagged) =
+                    judge.deviation(piece, &Piece::on_edge(k, MIDDLE), &edge.middle, &linear);
+                if !flagged && judge.goal.scheme == Scheme::Linear {
+                    // An edge that stays linear has its middle there.
+                    edge.middle = linear;
+                }
+                verdicts.insert(key, Verdict { flagged, deviation, quarters: None });
+                continue;
             }
             // Parabola through start, middle and end at the quarters.
-            let quarters = [(start, end, 0.25), (end, start, 0.75)].map(|(near, far, at)| {
-                let predicted = blend(&[(0.375, &near), (0.75, &edge.middle), (-0.125, &far)]);
-                let found = judge.nodes.gathered(piece.element, &piece.receiver_on_edge(k, at), scratch);
-                done();
-                (judge.deviation(piece.element, &found, &predicted), found, predicted)
+            let predicted = [quarter(&start, &edge.middle, &end), quarter(&end, &edge.middle, &start)];
+            let found = [found[2 * at], found[2 * at + 1]];
+            let deviations = [0, 1].map(|c| {
+                let weights = Piece::on_edge(k, [0.25, 0.75][c]);
+                judge.deviation(piece, &weights, &found[c], &predicted[c])
             });
-            let flagged = quarters.iter().any(|((_, flagged), ..)| *flagged);
-            let deviation = quarters.iter().fold(0.0, |most: f64, ((deviation, _), ..)| most.max(*deviation));
-            let mut values = quarters.map(|(_, found, predicted)| if flagged { found } else { predicted });
+            let flagged = deviations.iter().any(|(_, flagged)| *flagged);
+            let deviation = deviations.iter().fold(0.0, |most: f64, (deviation, _)| most.max(*deviation));
+            let mut values = if flagged { found } else { predicted };
             if piece.ids[k] != key.0 {
                 values.reverse();
             }
-            Some((Verdict { flagged, deviation, quarters: values }, edge.middle, 2))
-        };
-        let found: Vec<_> = edges.par_iter().map_init(Scratch::default, judged).collect();
-        let mut verdicts = HashMap::new();
-        for ((key, _), found) in edges.into_iter().zip(found) {
-            let Some((verdict, middle, gathered)) = found else { continue };
-            self.gathered += gathered;
-            if !verdict.flagged
-                && let Some(edge) = self.edges.get_mut(&key)
-            {
-                // An edge that stays linear has its middle there.
-                edge.middle = middle;
-            }
-            verdicts.insert(key, verdict);
+            verdicts.insert(key, Verdict { flagged, deviation, quarters: Some(values) });
         }
         verdicts
     }
@@ -324,25 +253,23 @@ impl RefinedFacets {
         judge: &Judge<'_>,
         active: &[(usize, f64)],
         verdicts: &HashMap<EdgeKey, Verdict>,
-        done: &(impl Fn() + Sync),
     ) -> Vec<(f64, bool)> {
+        let mut centres = vec![(0.0, false); active.len()];
         if judge.goal.scheme != Scheme::Gather {
-            return vec![(0.0, false); active.len()];
+            return centres;
         }
         active.iter().for_each(|&(piece, _)| self.take_middles(piece));
-        let pieces = &self.pieces;
-        let asked = |scratch: &mut Scratch, &(piece, _): &(usize, f64)| {
-            let piece = &pieces[piece];
-            if (0..3).any(|k| verdicts.get(&piece.edge_key(k)).is_some_and(|v| v.flagged)) {
-                return None;
-            }
-            let found = judge.nodes.gathered(piece.element, &piece.receiver(&[1.0 / 3.0; 3]), scratch);
-            done();
-            Some(judge.deviation(piece.element, &found, &piece.quadratic(&[1.0 / 3.0; 3])))
+        let is_whole = |piece: &Piece| {
+            (0..3).all(|k| verdicts.get(&piece.edge_key(k)).is_none_or(|verdict| !verdict.flagged))
         };
-        let found: Vec<Option<(f64, bool)>> = active.par_iter().map_init(Scratch::default, asked).collect();
-        self.gathered += found.iter().flatten().count();
-        found.into_iter().map(Option::unwrap_or_default).collect()
+        let asked: Vec<usize> = (0..active.len()).filter(|&k| is_whole(&self.pieces[active[k].0])).collect();
+        let found = judge.gathered(asked.iter().map(|&k| (&self.pieces[active[k].0], CENTRE)));
+        self.gathered += found.len();
+        for (k, found) in asked.into_iter().zip(found) {
+            let piece = &self.pieces[active[k].0];
+            centres[k] = judge.deviation(piece, &CENTRE, &found, &piece.quadratic(&CENTRE));
+        }
+        centres
     }
 
     /// Cuts a triangle into four if one of its edges or its middle asks for it; returns the first child.
@@ -359,55 +286,31 @@ impl RefinedFacets {
         if !centre_flagged && of_edges.iter().flatten().all(|v| !v.flagged) {
             return None;
         }
-        // The halves of its edges: known where the quarters are, still to be gathered where an edge was linear.
-        let mut middles = [Edge { id: 0, middle: Parts::default(), straight: false }; 3];
-        for (k, middle) in middles.iter_mut().enumerate() {
+        // The halves of its edges: known where the quarters are, still to be gathered where only the middle is.
+        let mut middles = [(0, [0.0; 3]); 3];
+        for (k, at_middle) in middles.iter_mut().enumerate() {
             let (start, end) = (whole.ids[k], whole.ids[(k + 1) % 3]);
-            *middle = *self.edges.get(&key(start, end))?;
-            let straight = of_edges[k].is_none_or(|v| !v.flagged);
-            if straight || self.scheme != Scheme::Linear {
-                let corner = |k: usize| whole.corners[k % 3];
-                let (a, b) = (corner(k).after, corner(k + 1).before);
-                let quarter = |near: &Parts, far: &Parts| match self.scheme {
-                    Scheme::Linear => blend(&[(0.5, near), (0.5, &middle.middle)]),
-                    _ => blend(&[(0.375, near), (0.75, &middle.middle), (-0.125, far)]),
-                };
-                let mut values = [quarter(&a, &b), quarter(&b, &a)];
-                if let (Some(verdict), true) = (of_edges[k], self.scheme != Scheme::Linear) {
-                    values = verdict.quarters;
-                    if start > end {
-                        values.reverse();
-                    }
+            let Edge { id, middle, .. } = *self.edges.get(&key(start, end))?;
+            *at_middle = (id, middle);
+            let straight = of_edges[k].is_none_or(|verdict| !verdict.flagged);
+            let measured = of_edges[k].and_then(|verdict| verdict.quarters);
+            let (a, b) = whole.ends(k);
+            let halves = match measured {
+                Some([first, second]) if start < end => Some([first, second]),
+                Some([first, second]) => Some([second, first]),
+                None if !straight => None,
+                None if self.scheme == Scheme::Linear => {
+                    Some([&a, &b].map(|end| blend(&[(0.5, end), (0.5, &middle)])))
                 }
-                self.insert(key(start, middle.id), values[0], straight);
-                self.insert(key(middle.id, end), values[1], straight);
+                None => Some([quarter(&a, &middle, &b), quarter(&b, &middle, &a)]),
+            };
+            if let Some([first, second]) = halves {
+                self.insert(key(start, id), first, straight);
+                self.insert(key(id, end), second, straight);
             }
         }
-        // Corners 0 to 2, then the middles of edges 0-1, 1-2 and 2-0.
-        let ids = [whole.ids[0], whole.ids[1], whole.ids[2], middles[0].id, middles[1].id, middles[2].id];
-        let point = |k: usize| match k {
-            0..3 => (whole.points[k], whole.places[k], whole.corners[k]),
-            _ => {
-                let (a, b) = (k - 3, (k - 2) % 3);
-                let point = 0.5 * (whole.points[a] + whole.points[b]);
-                let place = 0.5 * (whole.places[a] + whole.places[b]);
-                (point, place, Corner::whole(middles[k - 3].middle))
-            }
-        };
         let first = self.pieces.len();
-        for corners in CHILDREN {
-            self.pieces.push(Piece {
-                element: whole.element,
-                ids: corners.map(|k| ids[k]),
-                points: corners.map(|k| point(k).0),
-                places: corners.map(|k| point(k).1),
-                corners: corners.map(|k| point(k).2),
-                middles: [Parts::default(); 3],
-                children: 0,
-                error: LEFT_AFTER_CUT * deviation,
-                unresolved: false,
-            });
-        }
+        self.pieces.extend(whole.cut(middles, LEFT_AFTER_CUT * deviation));
         self.pieces[piece].children = first;
         self.cut += 1;
         Some(first)
@@ -415,11 +318,11 @@ impl RefinedFacets {
 
     /// Gives a triangle the middles of its edges; the mean of the ends where one was never asked.
     fn take_middles(&mut self, piece: usize) {
-        let Piece { corners, .. } = self.pieces[piece];
         for k in 0..3 {
-            let middle = self.edges.get(&self.pieces[piece].edge_key(k)).map(|edge| edge.middle);
-            let mean = || blend(&[(0.5, &corners[k].after), (0.5, &corners[(k + 1) % 3].before)]);
-            self.pieces[piece].middles[k] = middle.unwrap_or_else(mean);
+            let whole = &self.pieces[piece];
+            let (start, end) = whole.ends(k);
+            let middle = self.edges.get(&whole.edge_key(k)).map(|edge| edge.middle);
+            self.pieces[piece].middles[k] = middle.unwrap_or_else(|| blend(&[(0.5, &start), (0.5, &end)]));
         }
     }
 
@@ -443,66 +346,38 @@ impl RefinedFacets {
     }
 }
 
-/// Corners of the children: one at each corner, in the order of the corners, and the one in the middle.
-const CHILDREN: [[usize; 3]; 4] = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]];
-
-impl Piece {
-    fn edge_key(&self, k: usize) -> EdgeKey {
-        key(self.ids[k], self.ids[(k + 1) % 3])
-    }
-
-    /// Where a part `at` along edge `k` receives: just inside.
-    fn receiver_on_edge(&self, k: usize, at: f64) -> Receiver {
-        let mut weights = [0.0; 3];
-        (weights[k], weights[(k + 1) % 3]) = (1.0 - at, at);
-        self.receiver(&weights)
-    }
-
-    /// Where the place with these weights of the corners receives: just inside.
-    fn receiver(&self, weights: &[f64]) -> Receiver {
-        let [a, b, c] = self.points;
-        let point = weights[0] * a + weights[1] * b + weights[2] * c;
-        let normal = (b - a).cross(c - a).normalize_or_zero();
-        Receiver { point: limit_from_inside(point, (a + b + c) / 3.0), normal, face: None }
-    }
-
-    /// Corner values; each turns with the direction from its corner.
-    fn turned(&self, weights: &[f64]) -> [Parts; 3] {
-        std::array::from_fn(|k| {
-            let (before, after) = (weights[(k + 2) % 3], weights[(k + 1) % 3]);
-            let turned = if before + after > 0.0 { after / (before + after) } else { 0.5 };
-            blend(&[(1.0 - turned, &self.corners[k].before), (turned, &self.corners[k].after)])
-        })
-    }
-
-    fn linear(&self, weights: &[f64]) -> Parts {
-        let [a, b, c] = &self.turned(weights);
-        blend(&[(weights[0], a), (weights[1], b), (weights[2], c)])
-    }
-
-    /// Over six nodes; a parabola that dips below zero, as beside an umbra, is cut off there.
-    fn quadratic(&self, weights: &[f64]) -> Parts {
-        let ([a, b, c], [ab, bc, ca], w) = (&self.turned(weights), &self.middles, quadratic_weights(weights));
-        let value = blend(&[(w[0], a), (w[1], b), (w[2], c), (w[3], ab), (w[4], bc), (w[5], ca)]);
-        value.map(|x| x.max(0.0))
-    }
-}
-
 /// The facet as a piece, if it is a triangle.
-fn root(nodes: &NodeRadiosity<'_>, surface: &VisibleSurface, element: ElementId) -> Option<Piece> {
+fn root(
+    nodes: &NodeRadiosity<'_>,
+    surface: &VisibleSurface,
+    element: ElementId,
+    part: Part,
+) -> Option<Piece> {
     let places = <[DVec2; 3]>::try_from(surface.corners(element)).ok()?;
     let Ends { ids, points, corners } = nodes.ends(element)?;
-    let middles = [Parts::default(); 3];
-    Some(Piece { element, ids, points, places, corners, middles, children: 0, error: 0.0, unresolved: false })
+    Some(Piece {
+        element,
+        ids,
+        points,
+        places,
+        corners: corners.map(|corner| corner.part(part)),
+        middles: [[0.0; 3]; 3],
+        children: 0,
+        error: 0.0,
+        unresolved: false,
+    })
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::judge::Proof;
     use crate::lit_scene::LitScene;
     use crate::test_scenes::{add_parallelogram, empty_mesh, lit};
+    use geometry::gather::Scratch;
     use geometry::source_tree::Opening;
+    use glam::DVec3;
     use interchange::ids::{NodeId, VertexId};
 
     /// The unit floor as two triangles on the diagonal, lit by a small bright plate close above its middle.
@@ -527,6 +402,11 @@ mod tests {
         scene
     }
 
+    /// The lamp does not emit but reflect, so that its light is indirect.
+    fn goal(scheme: Scheme, tolerance: f64) -> Goal {
+        Goal { part: Part::Indirect, scheme, proof: Proof::Quarters, tolerance, pixels: 1.0 }
+    }
+
     fn refined(scene: &LitScene, scheme: Scheme, tolerance: f64) -> (RefinedFacets, Vec<[DVec2; 3]>) {
         let surface = VisibleSurface::new(scene);
         let mut nodes = NodeRadiosity::new(scene, Opening::EXACT);
@@ -534,7 +414,8 @@ mod tests {
         nodes.gather(&floor, |_| {}, || {});
         let facets = floor.map(|element| (element, 1e6));
         let places = floor.map(|e| <[DVec2; 3]>::try_from(surface.corners(e)).unwrap()).to_vec();
-        (RefinedFacets::new(&nodes, &surface, &facets, Goal { scheme, tolerance }, || {}), places)
+        let goal = goal(scheme, tolerance);
+        (RefinedFacets::new(&nodes, &surface, &facets, goal, &|_, _| [0.0; 3], || {}), places)
     }
 
     #[test]
@@ -548,12 +429,12 @@ mod tests {
         let leg = 0.5 / 1.25f64.sqrt();
         let want = 4.0 / std::f64::consts::PI * leg * leg.atan();
         let middle = 0.5 * (places[0][0] + places[0][2]);
-        let got = refined.at(ElementId(0), middle, weights).unwrap().irradiance[3];
+        let got = refined.at(ElementId(0), middle, weights).unwrap().irradiance[0];
         assert!((got - want).abs() < 1e-4 * want, "{got} {want}");
         for t in [0.1, 0.3, 0.45, 0.7] {
             let place = places[0][0].lerp(places[0][2], t);
             let [a, b] =
-                [ElementId(0), ElementId(1)].map(|e| refined.at(e, place, weights).unwrap().irradiance[3]);
+                [ElementId(0), ElementId(1)].map(|e| refined.at(e, place, weights).unwrap().irradiance[0]);
             assert!((a - b).abs() < 1e-6 * want, "at {t} of the diagonal: {a} and {b}");
         }
     }
@@ -573,7 +454,7 @@ mod tests {
             let point = points[0] + u * (points[1] - points[0]) + v * (points[2] - points[0]);
             let receiver = Receiver { point, normal: DVec3::Y, face: None };
             let want = nodes.gathered(ElementId(0), &receiver, &mut Scratch::default())[3];
-            let got = refined.at(ElementId(0), place, &mut Vec::new()).unwrap().irradiance[3];
+            let got = refined.at(ElementId(0), place, &mut Vec::new()).unwrap().irradiance[0];
             worst = worst.max((got - want).abs() / want.max(0.01));
         }
         (worst, refined.gathered)

@@ -3,13 +3,17 @@
 //! picture has no noise and is the same for any number of threads.
 
 use crate::camera::Camera;
+use crate::extent::{Extent, extend};
 use crate::interpolation::corner_weights;
+use crate::judge::Scheme;
 use crate::layers::{Layer, NOTHING, Pixel, Values};
+use crate::light::Part;
 use crate::lit_scene::LitScene;
 use crate::nodes::NodeRadiosity;
 use crate::picture::Picture;
 use crate::receiver::{Parts, total};
-use crate::refined::{Goal, RefinedFacets, Scheme};
+use crate::refined::Found;
+use crate::refined_parts::RefinedParts;
 use crate::visible::{Seen, VisibleSurface};
 use geometry::gather::Scratch;
 use geometry::polygon;
@@ -67,7 +71,7 @@ struct Looks<'a> {
     scene: &'a LitScene,
     surface: &'a VisibleSurface,
     nodes: &'a NodeRadiosity<'a>,
-    refined: Option<&'a RefinedFacets>,
+    refined: Option<&'a RefinedParts>,
     gathered: &'a AtomicU64,
 }
 
@@ -101,31 +105,33 @@ impl<'a> Renderer<'a> {
 
         // Find what every sample sees, and so how many samples every facet has; a single band is kept for later.
         let mut kept = None;
-        let mut seen_samples = vec![0u32; self.scene.mesh.element_count()];
+        let mut extents = vec![Extent::default(); self.scene.mesh.element_count()];
         report.phase("visible surface", || {
             for band in &bands {
                 let seen = look(band);
-                count_samples(&seen, &mut seen_samples);
+                extend(&mut extents, &seen, per_pixel, (width, band.start));
                 kept = (bands.len() == 1).then_some(seen);
             }
         });
 
         // Gather at the nodes of the facets that are seen, and in between where interpolation does not serve.
         let elements: Vec<ElementId> =
-            (0..seen_samples.len()).filter(|&k| seen_samples[k] > 0).map(ElementId::new).collect();
+            (0..extents.len()).filter(|&k| extents[k].is_seen()).map(ElementId::new).collect();
         let bar = common.progress("render", height);
         let refined = quality.scheme.map(|scheme| {
             report.phase("gather at nodes", || {
                 self.nodes.gather(&elements, |points| bar.inc_length(points as u64), || bar.inc(1));
             });
-            let facets: Vec<(ElementId, f64)> = elements
-                .iter()
-                .map(|&e| (e, f64::from(seen_samples[e.index()]) / per_pixel as f64))
-                .collect();
-            let goal = Goal { scheme, tolerance: quality.tolerance };
-            report.phase("gather in between", || {
-                RefinedFacets::new(&self.nodes, surface, &facets, goal, || bar.tick())
-            })
+            let facets: Vec<(ElementId, f64)> =
+                elements.iter().map(|&e| (e, extents[e.index()].pixels())).collect();
+            RefinedParts::new(
+                &self.nodes,
+                surface,
+                &facets,
+                (scheme, quality.tolerance),
+                || bar.tick(),
+                report,
+            )
         });
 
         // Interpolate, and average over each pixel.
@@ -160,9 +166,7 @@ impl<'a> Renderer<'a> {
         report.count("samples", width * height * per_pixel);
         report.count("samples_gathered", gathered.load(Ordering::Relaxed) as usize);
         if let Some(refined) = &refined {
-            report.count("points_gathered_in_between", refined.gathered);
-            report.count("facets_cut", refined.cut);
-            report.count("facets_unresolved", refined.unresolved);
+            refined.count(report);
         }
         for (channel, mean) in ["r", "g", "b"].iter().zip(picture.mean()) {
             report.estimate(&format!("mean_radiance_{channel}"), mean);
@@ -188,15 +192,6 @@ fn append_layers(all: &mut Vec<(Layer, Values)>, layers: &[Layer], pixels: &[Pix
         match all.get_mut(k) {
             Some((_, values_before)) => values_before.append(values),
             None => all.push((layer, values)),
-        }
-    }
-}
-
-/// Adds the samples of each facet.
-fn count_samples(seen: &[Seen], samples: &mut [u32]) {
-    for sample in seen {
-        if let Seen::Surface(element, ..) = sample {
-            samples[element.index()] = samples[element.index()].saturating_add(1);
         }
     }
 }
@@ -286,19 +281,24 @@ impl Looks<'_> {
             let h = self.scene.irradiance[self.scene.source_of[element.index()] as usize];
             return ([0.0, 0.0, 0.0, h[0], h[1], h[2]], 0.0);
         };
-        match refined.at(element, place, weights) {
-            Some(found) => match found.gather {
-                Some(receiver) if self.nodes.reflects(element) => {
-                    self.gathered.fetch_add(1, Ordering::Relaxed);
-                    (self.nodes.gathered(element, &receiver, scratch), 0.0)
-                }
-                _ => (found.irradiance, found.error),
-            },
-            None => {
-                corner_weights(self.surface.corners(element), place, weights);
-                (self.nodes.interpolate(element, weights), 0.0)
+        let Some(found) = refined.at(element, place, weights) else {
+            corner_weights(self.surface.corners(element), place, weights);
+            return (self.nodes.interpolate(element, weights), 0.0);
+        };
+        let mut error = 0.0;
+        let mut part = |part: Part, found: Found| match found.gather {
+            Some(receiver) if self.nodes.reflects(element) => {
+                self.gathered.fetch_add(1, Ordering::Relaxed);
+                self.nodes.part(part, element, &receiver, scratch)
             }
-        }
+            _ => {
+                error += found.error;
+                found.irradiance
+            }
+        };
+        let [a, b, c] = part(Part::Direct, found[0]);
+        let [d, e, f] = part(Part::Indirect, found[1]);
+        ([a, b, c, d, e, f], error)
     }
 }
 

@@ -2,9 +2,9 @@
 //! the exposure and curve of the last one, so that what differs is the light.
 
 use crate::canvas::{Canvas, GROUND, text_height, text_scale, text_width};
-use crate::command_line::ends_in;
 use crate::error::{Error, Result};
 use crate::exr_reader::StoredPicture;
+use crate::flag_values::ends_in;
 use crate::picture::{Picture, luminance};
 use crate::tone::ToneArguments;
 use crate::view::tell_exposure;

@@ -2,10 +2,10 @@
 
 use crate::canvas::Canvas;
 use crate::colour_scale::{Scale, captioned, coloured, label, round_step, with_bar};
-use crate::command_line::{ends_in, numbers};
 use crate::element_error;
 use crate::error::{Error, Result};
 use crate::exr_reader::StoredPicture;
+use crate::flag_values::{ends_in, numbers};
 use crate::isolux::isolux;
 use crate::layers::{Layer, Values};
 use crate::mesh_overlay::mesh_overlay;

@@ -275,7 +275,9 @@ fn every_camera_of_a_toml_and_a_turntable_give_files_of_their_own() {
         + &camera("plan", "projection = \"orthographic\"\nview_height = 0.5")
         + &camera("around", "projection = \"equirectangular\"");
     std::fs::write(folder.path().join("c.toml"), toml).unwrap();
-    let line = "render s.sol --mesh s.mesh -o s.exr --png s.png --camera c.toml --all-cameras";
+    // The lamp's share and the walls' add up to 1, but each changes from place to place and is interpolated for itself:
+    // to less than what is asked here.
+    let line = "render s.sol --mesh s.mesh -o s.exr --png s.png --camera c.toml --all-cameras --interpolation gather --tolerance 5e-4";
     let output = run(folder.path(), line);
     assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
     for name in ["front", "plan", "around"] {
