@@ -141,7 +141,7 @@ named   = $(foreach f,$(filter-out $(P).%,$(wildcard $(subst =, ,$1))),$(if $(wi
 # `clean` and `test` need none of it.
 tools   := mesh-tool formfactor-tool solve-tool shade-tool
 built   := $(tools:%=$(BIN)%)
-running := $(filter-out clean test,$(or $(MAKECMDGOALS),all))
+running := $(filter-out clean test stress fuzz faults,$(or $(MAKECMDGOALS),all))
 find-program = $(or $(wildcard $(shell command -v $(firstword $2))),$(error pipeline.mk: $1 = "$2": no such program))
 program = $(if $(running),$(if $(filter $(built),$($1)),$($1),\
   $(call find-program,$1,$($1)) $(call named,$(wordlist 2,99,$($1)))))
@@ -318,3 +318,33 @@ clean:
 	rm -f $(foreach f,$(outputs:$(P)%=$(hidden)%),$f.*.partial $f.report.json.*.partial $f.*.mode)
 	rm -f $(foreach e,.ff .ff.report.json .ff.made .ff.made.start .ff.made.new,$(P).[1-9]*of[1-9]*$e)
 	rm -f $(addprefix $(hidden).[1-9]*of[1-9]*.ff.,*.partial report.json.*.partial *.mode)
+
+# ---- Proof: time against error, stress, damage, skips ------------------------------------------------------------------
+
+# BENCHMARKS.md says what is measured. An interrupted bench goes on; BENCH_FLAGS="--scenes cornell_empty --minutes 3" does
+# a part, and `skips` without SCENE measures the reference scenes.
+BENCH_FLAGS ?=
+.PHONY: bench reference skips stress fuzz faults
+bench reference: $(built)
+	$(cargo)
+	MAKEFLAGS= cargo bench --quiet -p tests --bench proof --manifest-path $(ROOT)Cargo.toml -- $@ $(BENCH_FLAGS)
+skips: $(built)
+	$(cargo)
+	MAKEFLAGS= cargo bench --quiet -p tests --bench proof --manifest-path $(ROOT)Cargo.toml -- skips \
+	  $(if $(filter file,$(origin SCENE)),,--scene $(abspath $(SCENE)) --errors $(ERROR)) $(BENCH_FLAGS)
+# The stress table, each row with the number it must meet.
+stress:
+	$(cargo)
+	STRESS_INTO=$(abspath $(ROOT)BENCHMARKS.md) MAKEFLAGS= cargo test --release -p tests --test stress \
+	  --manifest-path $(ROOT)Cargo.toml -- --nocapture
+# Every fuzz body for T seconds, one after another, by seeded changes on stable Rust; fuzz/ has the same bodies for cargo-fuzz.
+T ?= 600
+fuzz:
+	$(cargo)
+	FUZZ_SECONDS=$(T) MAKEFLAGS= cargo test --release -p tests --test fuzz --manifest-path $(ROOT)Cargo.toml \
+	  -- --nocapture --test-threads 1
+# kill -9 at 200 moments, 1,000 damaged files; the ordinary tests do a part of it with the same seeds.
+faults:
+	$(cargo)
+	FAULTS=full MAKEFLAGS= cargo test --release -p tests --test faults --test pipeline_real --manifest-path $(ROOT)Cargo.toml \
+	  -- --nocapture

@@ -91,7 +91,10 @@ pub fn exchange(p: &Patch, q: &Patch, relative: f64) -> (Exchange, Rule) {
 
 /// As [`exchange`] for patches known to lie wholly in front of each other.
 pub fn exchange_in_front(p: &Patch, q: &Patch, relative: f64) -> (Exchange, Rule) {
-    in_front(p, q, relative, DEEPEST_HALVING)
+    let (found, rule) = in_front(p, q, relative, DEEPEST_HALVING);
+    // Seen edge-on within rounding, a point may lie behind the other's plane: the product of cosines is then below zero.
+    let (value, error) = (found.value.max(0.0), found.error.max(-found.value));
+    (Exchange { value, error }, rule)
 }
 
 /// Halves of the larger patch, cut across its longest extent.

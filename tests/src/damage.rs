@@ -52,3 +52,8 @@ pub fn flips(good: &[u8], count: usize, seed: u64) -> impl Iterator<Item = (usiz
         (place, bad)
     })
 }
+
+/// Whether the full number of faults is asked for (FAULTS=full, `make -f pipeline.mk faults`) and not the quick subset.
+pub fn full() -> bool {
+    std::env::var_os("FAULTS").is_some_and(|value| value == "full")
+}

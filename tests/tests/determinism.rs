@@ -30,6 +30,20 @@ fn outputs(scene: &str, threads: u32) -> BTreeMap<String, Vec<u8>> {
     let mut probe = tool("shade-tool");
     probe.arg("probe").arg(chain.path("sol")).arg("--mesh").arg(&mesh).arg("--points").arg(&points);
     run(probe.arg("-o").arg(folder.path().join("probed.csv")).args(&chain.common)).expect_code(0);
+    // Looks, exports for other programs and pictures of each stage.
+    let file = |name: &str| folder.path().join(name);
+    let mut jobs = vec![
+        ("mesh-tool", vec!["picture".into(), mesh.clone(), "-o".into(), file("mesh.svg")]),
+        ("formfactor-tool", vec!["picture".into(), chain.path("ff"), "-o".into(), file("matrix.png")]),
+        ("shade-tool", vec!["view".into(), "tone".into(), chain.path("exr"), "-o".into(), file("view.png")]),
+    ];
+    for ending in ["ply", "vtu", "glb", "rad", "vs3"] {
+        let output = file(&format!("mesh.{ending}"));
+        jobs.push(("mesh-tool", vec!["export".into(), mesh.clone(), "-o".into(), output]));
+    }
+    for (name, words) in jobs {
+        run(tool(name).args(words).args(&chain.common)).expect_code(0);
+    }
     read(folder.path())
 }
 

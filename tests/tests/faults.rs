@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use tests::chain::{Chain, Stage, assert_refused};
-use tests::damage::{Dice, cuts, flips};
+use tests::damage::{Dice, cuts, flips, full};
 use tests::{bytes, run, tool};
 
 /// The Cornell box in a folder of its own, all stages run.
@@ -71,7 +71,9 @@ fn cut_files_are_refused_by_name() {
     let (_folder, chain) = made(60);
     for (seed, ending) in ["materials", "mesh", "ff", "sol"].into_iter().enumerate() {
         let good = bytes(&chain.path(ending));
-        for cut in cuts(good.len(), seed as u64) {
+        let more = Dice::new(300 + seed as u64);
+        let more = (0..if full() { 250 } else { 0 }).scan(more, |dice, _| Some(dice.below(good.len())));
+        for cut in cuts(good.len(), seed as u64).into_iter().chain(more) {
             assert_all_refuse(&chain, ending, &good[..cut]);
         }
         std::fs::write(chain.path(ending), good).unwrap();
@@ -83,7 +85,7 @@ fn flipped_bits_are_refused_by_name() {
     let (_folder, chain) = made(60);
     for (seed, ending) in ["materials", "mesh", "ff", "sol"].into_iter().enumerate() {
         let good = bytes(&chain.path(ending));
-        for (_, bad) in flips(&good, 24, 100 + seed as u64) {
+        for (_, bad) in flips(&good, if full() { 250 } else { 24 }, 100 + seed as u64) {
             assert_all_refuse(&chain, ending, &bad);
         }
         std::fs::write(chain.path(ending), good).unwrap();

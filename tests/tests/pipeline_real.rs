@@ -115,7 +115,8 @@ fn a_run_killed_at_any_moment_is_taken_up_by_the_next() {
 
     let scene = Scene::new();
     let mut dice = Dice::new(2);
-    for _ in 0..8 {
+    let full = tests::damage::full();
+    for kill in 0..if full { 200 } else { 8 } {
         let mut make = scene.make(&[]);
         let mut child = make.process_group(0).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
         std::thread::sleep(Duration::from_micros(dice.below(whole.as_micros() as usize) as u64));
@@ -124,6 +125,18 @@ fn a_run_killed_at_any_moment_is_taken_up_by_the_next() {
         let _ = Command::new("kill").args(["-9", "--", &group]).output();
         child.wait().unwrap();
         let _ = std::fs::remove_file(scene.output(["mesh", "ff", "sol", "exr"][dice.below(4)]));
+        if full {
+            run(&mut scene.make(&[])).expect_code(0);
+            for ending in ["mesh", "ff", "sol", "exr", "png"] {
+                assert_eq!(
+                    bytes(&scene.output(ending)),
+                    bytes(&reference.output(ending)),
+                    "kill {kill}: {ending}"
+                );
+            }
+            std::fs::remove_file(scene.output("ff")).unwrap();
+            std::fs::remove_file(scene.output("sol")).unwrap();
+        }
     }
     run(&mut scene.make(&[])).expect_code(0);
     for ending in ["materials", "surfaces", "mesh", "ff", "sol", "exr", "png"] {

@@ -1,0 +1,232 @@
+//! `make -f pipeline.mk bench`, `reference` and `skips`; see BENCHMARKS.md.
+//!
+//! usage: proof [bench|reference|skips] [--work DIR] [--scenes A,B] [--errors E,F] [--budget SECONDS] [--minutes M]
+//!              [--reference-error E] [--into FILE.md] [--scene FILE.obj]
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+use tests::proof::plan::{Case, ERRORS};
+use tests::proof::record::Row;
+use tests::proof::reference::{self, Reference};
+use tests::proof::{errors, plan, plot, record, runner, skips, table};
+
+/// What the command line asks for.
+struct Options {
+    job: String,
+    work: PathBuf,
+    scenes: Vec<String>,
+    errors: Vec<f64>,
+    budget: Duration,
+    end: Instant,
+    reference_error: f64,
+    into: PathBuf,
+    scene: Option<PathBuf>,
+}
+
+impl Options {
+    fn read() -> Self {
+        let mut given = BTreeMap::new();
+        let (mut job, mut arguments) = ("bench".to_owned(), std::env::args().skip(1));
+        while let Some(word) = arguments.next() {
+            match word.strip_prefix("--") {
+                // Cargo's own.
+                Some("bench") => {}
+                Some(name) => drop(given.insert(name.to_owned(), arguments.next().unwrap_or_default())),
+                None => job = word,
+            }
+        }
+        let mut take = |name: &str, default: &str| {
+            given.remove(name).filter(|value| !value.is_empty()).unwrap_or_else(|| default.to_owned())
+        };
+        let number = |text: String| text.parse::<f64>().unwrap_or_else(|e| panic!("{text}: {e}"));
+        let list = |text: String| text.split(',').map(str::to_owned).collect::<Vec<_>>();
+        let all = ERRORS.map(|e| e.to_string()).join(",");
+        let folder = |path: String| tests::root().join(path);
+        let options = Self {
+            job,
+            work: folder(take("work", "target/proof")),
+            scenes: list(take("scenes", &plan::scenes().join(","))),
+            errors: list(take("errors", &all)).into_iter().map(number).collect(),
+            budget: Duration::from_secs_f64(number(take("budget", "15"))),
+            end: Instant::now() + Duration::from_secs_f64(60.0 * number(take("minutes", "40"))),
+            reference_error: number(take("reference-error", "0.001")),
+            into: folder(take("into", "BENCHMARKS.md")),
+            scene: Some(take("scene", "")).filter(|s| !s.is_empty()).map(folder),
+        };
+        assert!(given.is_empty(), "unknown options: {:?}", given.keys());
+        std::fs::create_dir_all(&options.work).unwrap();
+        options
+    }
+}
+
+fn main() {
+    let options = Options::read();
+    match options.job.as_str() {
+        "bench" => bench(&options),
+        "reference" => options.scenes.iter().filter(|s| !s.starts_with("box")).for_each(|scene| {
+            println!("{}", note(scene, make_reference(&options, scene).as_ref()));
+        }),
+        "skips" => skip_tables(&options),
+        other => panic!("{other}: expected bench, reference or skips"),
+    }
+}
+
+/// A reference may take thirty times as long as a case.
+fn make_reference(options: &Options, scene: &str) -> Option<Reference> {
+    reference::make(scene, &options.work, options.reference_error, 30 * options.budget)
+}
+
+fn bench(options: &Options) {
+    let path = options.work.join("bench.csv");
+    let mut rows = record::read(&path);
+    let (mut references, mut matrices) = (BTreeMap::new(), BTreeMap::new());
+    let mut last: BTreeMap<_, (f64, f64)> = BTreeMap::new();
+    let mut asked = BTreeSet::new();
+    for case in plan::cases(&options.scenes, &options.errors) {
+        if Instant::now() > options.end {
+            println!("the time is over: another call goes on from here");
+            break;
+        }
+        let (prefix, commands) = runner::case_commands(&case, &options.work, "run");
+        let key = runner::key(&case, &commands, &options.work);
+        asked.insert(key.clone());
+        if let Some(known) = rows.iter().find(|row| row.key == key) {
+            last.insert(case.curve(), seconds(known, case.error, options.budget));
+            continue;
+        }
+        let foretold = last.get(&case.curve()).map_or(0.0, |&(s, e)| plan::foretold_s(s, e, case.error));
+        let mut row = row_of(&case, &key);
+        if foretold > options.budget.as_secs_f64() {
+            row.state = format!("over budget (foretold {foretold:.0} s)");
+        } else {
+            let done = runner::run_commands(&prefix, &commands, options.budget);
+            (row.state, row.costs, row.elements) = (done.state, done.costs, done.elements);
+        }
+        if row.state == "done" && case.matrix_only() {
+            let least = options.errors.iter().copied().fold(f64::INFINITY, f64::min);
+            let reference = matrices
+                .entry(case.scene.clone())
+                .or_insert_with(|| reference::matrix(&case.scene, &options.work, matrix_tolerance(least)));
+            [row.errors[3], row.errors[4]] = errors::rows(&prefix.with_extension("ff"), reference);
+        } else if row.state == "done" {
+            let reference =
+                references.entry(case.scene.clone()).or_insert_with(|| make_reference(options, &case.scene));
+            compare(&mut row, &prefix, reference.as_ref());
+        }
+        println!(
+            "{} {}/{} {}: {} {:.2} CPU s, error {:.2e}",
+            case.scene,
+            case.method,
+            case.mesh,
+            case.error,
+            row.state,
+            row.cpu_s(),
+            row.main_error()
+        );
+        last.insert(case.curve(), seconds(&row, case.error, options.budget));
+        rows.push(row);
+        record::write(&path, &rows);
+    }
+    // Rows of older programs or flags stay in the CSV, out of the tables.
+    let current: Vec<&Row> = rows.iter().filter(|row| asked.contains(&row.key)).collect();
+    publish(options, &current, &references);
+}
+
+/// The row errors of the pipeline's matrices are some hundredths of the tolerance, which is half the asked error.
+fn matrix_tolerance(least_error: f64) -> f64 {
+    (least_error / 2.0 / 100.0).max(1e-6)
+}
+
+fn row_of(case: &Case, key: &str) -> Row {
+    Row {
+        key: key.to_owned(),
+        commit: table::commit(),
+        scene: case.scene.clone(),
+        method: case.method.to_owned(),
+        mesh: case.mesh.to_owned(),
+        asked: case.error,
+        errors: [f64::NAN; 5],
+        ..Row::default()
+    }
+}
+
+/// Seconds and error that the next case of the curve is foretold from.
+fn seconds(row: &Row, error: f64, budget: Duration) -> (f64, f64) {
+    let wall: f64 = row.costs.iter().map(|cost| cost.wall_s).sum();
+    // What was stopped would have taken longer than the budget.
+    (if row.state == "done" { wall } else { 2.0 * budget.as_secs_f64() }, error)
+}
+
+fn compare(row: &mut Row, prefix: &Path, reference: Option<&Reference>) {
+    let Some(reference) = reference else { return };
+    if let Some(points) = &reference.points
+        && let Some(got) = errors::probe(prefix, points)
+    {
+        row.errors[0] = errors::rms(&got, &reference.irradiance);
+        row.errors[1] = errors::rms(&got, &errors::given(points));
+    }
+    row.errors[2] = errors::picture(&prefix.with_extension("exr"), &reference.prefix.with_extension("exr"));
+}
+
+/// What is to be known of a scene's reference.
+fn note(scene: &str, reference: Option<&Reference>) -> String {
+    match reference {
+        None if scene.starts_with("box") => {
+            "Quads as given; reference: the contour rule and exact visible parts at a \
+            tolerance of a hundredth of the least one here."
+                .to_owned()
+        }
+        None => format!("{scene}: no reference within the budget."),
+        Some(r) => format!(
+            "{scene}: the reference is {:.1e} (points) and {:.1e} (picture) from a run at twice its error; {:.1e} from \
+             the given answers. Errors that are less than ten times the first two are uncertain by them.",
+            r.own_error[0], r.own_error[1], r.given_error
+        ),
+    }
+}
+
+fn publish(options: &Options, rows: &[&Row], references: &BTreeMap<String, Option<Reference>>) {
+    let pictures = options.into.with_file_name("docs").join("bench");
+    std::fs::create_dir_all(&pictures).unwrap();
+    let mut text = format!(
+        "Machine: {}. Budget of a run {:.0} s on the clock; compare ratios within this table only.\n\n",
+        table::machine(),
+        options.budget.as_secs_f64()
+    );
+    for scene in &options.scenes {
+        let own: Vec<&Row> = rows.iter().copied().filter(|row| row.scene == *scene).collect();
+        if own.is_empty() {
+            continue;
+        }
+        // Rows may all be known from an earlier call; their reference lies in the work folder then.
+        let made = references
+            .get(scene)
+            .cloned()
+            .unwrap_or_else(|| if scene.starts_with("box") { None } else { make_reference(options, scene) });
+        let picture = pictures.join(format!("{scene}.svg"));
+        plot::draw(&picture, scene, &own).unwrap_or_else(|e| panic!("{}: {e}", picture.display()));
+        text += &format!("### {scene}\n\n{}", table::scene(&own, &note(scene, made.as_ref())));
+        if picture.exists() {
+            text += &format!("\n![time against error](docs/bench/{scene}.svg)\n\n");
+        }
+    }
+    table::put(&options.into, "bench", &text);
+    println!("written: {}", options.into.display());
+}
+
+fn skip_tables(options: &Options) {
+    let error = options.errors.first().copied().filter(|_| options.errors.len() == 1).unwrap_or(0.02);
+    let print = |file: &Path| skips::tables(file, &options.work, error, options.budget);
+    if let Some(scene) = &options.scene {
+        println!("{}", print(scene));
+        return;
+    }
+    let mut text = format!("Machine: {}. ERROR={error}.\n\n", table::machine());
+    for scene in options.scenes.iter().filter(|scene| !scene.starts_with("box")) {
+        text += &format!("### {scene}\n\n{}\n", print(&plan::scene_file(scene, &options.work)));
+    }
+    println!("{text}");
+    table::put(&options.into, "skips", &text);
+}

@@ -1,0 +1,133 @@
+//! Every fuzz body over seeded inputs, on stable. FUZZ_SECONDS=600 lets each go on that long (`make -f pipeline.mk fuzz
+//! T=600`); without it each runs a fixed number of inputs. A failure prints the seed and the bytes.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::time::{Duration, Instant};
+use tests::chain::Chain;
+use tests::damage::Dice;
+use tests::fuzz::{READERS, changed, clipping, form_factor_invariants, reader};
+use tests::{run, tool, two_squares};
+
+/// Inputs of each geometric body where no time is asked for.
+const SHORT: u64 = 50_000;
+
+/// Inputs of each reader: files cost more.
+const SHORT_FILES: u64 = 120;
+
+/// Feeds a body with the inputs of seeds 0, 1, 2 and so on.
+#[track_caller]
+fn drive(name: &str, short: u64, input: impl Fn(&mut Dice) -> Vec<u8>, body: impl Fn(&[u8])) {
+    let seconds =
+        std::env::var("FUZZ_SECONDS").ok().and_then(|s| s.parse().ok()).map(Duration::from_secs_f64);
+    let start = Instant::now();
+    let mut seed = 0;
+    while seconds.map_or(seed < short, |limit| start.elapsed() < limit) {
+        let bytes = input(&mut Dice::new(seed));
+        let done = catch_unwind(AssertUnwindSafe(|| body(&bytes)));
+        assert!(done.is_ok(), "{name}: seed {seed}: {}", bytes.escape_ascii());
+        seed += 1;
+    }
+    println!("fuzz: {name}: {seed} inputs in {:.0} s", start.elapsed().as_secs_f64());
+}
+
+/// Good files of all kinds in a folder, named `s.*`.
+fn good_files(folder: &Path) {
+    for ending in ["obj", "mtl", "toml"] {
+        let from = tests::scene(&format!("cornell_blocks.{ending}"));
+        let text = tests::text(&from).replace("cornell_blocks.mtl", "s.mtl");
+        std::fs::write(folder.join("s").with_extension(ending), text).unwrap();
+    }
+    let files = two_squares::write(folder);
+    for (from, ending) in files.all().into_iter().zip(["mesh", "materials", "ff", "sol"]) {
+        std::fs::copy(from, folder.join("s").with_extension(ending)).unwrap();
+    }
+    for ending in ["csv", "npy", "npz", "mtx", "rmx", "vf"] {
+        let mut export = tool("formfactor-tool");
+        export
+            .arg("export")
+            .arg(&files.matrix)
+            .arg("--mesh")
+            .arg(&files.mesh)
+            .args(["--by", "element", "-o"]);
+        run(export.arg(folder.join("s").with_extension(ending))).expect_code(0);
+    }
+    let mut export = tool("mesh-tool");
+    run(export.arg("export").arg(&files.mesh).arg("-o").arg(folder.join("s.vs3"))).expect_code(0);
+}
+
+#[test]
+fn readers_answer_any_bytes() {
+    let folder = tests::folder();
+    good_files(folder.path());
+    for ending in READERS {
+        let path = folder.path().join("s").with_extension(ending);
+        let good = tests::bytes(&path);
+        assert!(reader(folder.path(), ending, &good), "the good {ending} is refused");
+        drive(
+            ending,
+            SHORT_FILES,
+            |dice| changed(&good, dice),
+            |bytes| {
+                let _ = reader(folder.path(), ending, bytes);
+            },
+        );
+        std::fs::write(path, good).unwrap();
+    }
+}
+
+/// Bytes of a seeded length.
+fn noise(dice: &mut Dice) -> Vec<u8> {
+    let length = dice.below(64);
+    (0..length).map(|_| dice.bits() as u8).collect()
+}
+
+#[test]
+fn clipping_keeps_its_promises() {
+    drive("clipping", SHORT, noise, clipping);
+}
+
+#[test]
+fn form_factors_keep_their_invariants() {
+    drive("form_factor_invariants", SHORT, noise, form_factor_invariants);
+}
+
+/// Blockers only take away: each factor with a screen in the room is at most the one without, and rows sum to 1 at most.
+#[test]
+fn blocked_factors_are_no_larger() {
+    let folder = tests::folder();
+    let mut dice = Dice::new(7);
+    for _ in 0..6 {
+        let mut at = || 0.2 + 0.6 * dice.below(1000) as f64 / 1000.0;
+        let (a, b, c) = ([at(), at(), at()], [at(), at(), at()], [at(), at(), at()]);
+        let screen = tests::surfaces::Surface::new("screen", [a, b, c]);
+        let mut surfaces = tests::surfaces::room([1.0; 3]);
+        let factors = |surfaces: &[tests::surfaces::Surface]| {
+            let file = tests::surfaces::write(folder.path(), surfaces);
+            let chain = Chain::as_given(file, folder.path()).with_tolerances("1e-4", "1e-3");
+            chain.compute();
+            let table = chain.factors("face");
+            let cells = |row: &Vec<String>| row[row.len() - table.rows.len()..].to_vec();
+            table
+                .rows
+                .iter()
+                .map(|r| cells(r).iter().map(|c| c.parse().unwrap()).collect())
+                .collect::<Vec<Vec<f64>>>()
+        };
+        let open = factors(&surfaces);
+        surfaces.push(screen);
+        let blocked = factors(&surfaces);
+        for (i, row) in open.iter().enumerate() {
+            assert!(blocked[i].iter().sum::<f64>() <= 1.0 + 1e-4, "{a:?} {b:?} {c:?}: row {i}");
+            // Each of the two is within the tolerance.
+            assert!(row.iter().zip(&blocked[i]).all(|(f, g)| *g <= f + 2e-4), "{a:?} {b:?} {c:?}: row {i}");
+        }
+    }
+}
+
+/// A patch seen edge-on within rounding: the one-point rule gave -5e-34.
+#[test]
+fn a_patch_seen_edge_on_has_no_negative_factor() {
+    form_factor_invariants(b"V\x9b\xef\x9f\xa3\xf9\xf5\xe5u\x02\x19>\xa7*v\x9f\xdee\x82yJkLX\\\xceX\x85");
+}

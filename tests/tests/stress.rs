@@ -1,0 +1,287 @@
+//! Degenerate and extreme scenes: each row of the table has a number it must meet. `make -f pipeline.mk stress` prints
+//! the table; with STRESS_INTO=FILE.md it is kept there.
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+use tests::chain::{Chain, Stage};
+use tests::proof::boxes;
+use tests::proof::errors::{given, rms};
+use tests::stress::{Row, TOLERANCE, factors, opposed, opposed_faces, table, wedge};
+use tests::surfaces::{Paint, Surface, room, write};
+use tests::table::Table;
+use tests::{run, tool};
+
+const BOUND: &str = "the matrix tolerance bounds a row's error, so each factor's";
+
+/// Error of F between the first two faces; infinite where a tool refuses.
+fn error(surfaces: &[Surface], build: &[&str], compute: &[&str], want: f64) -> f64 {
+    match factors(surfaces, build, compute) {
+        Ok(f) if f.len() >= 2 => (f[0][1] - want).abs(),
+        Ok(_) => f64::INFINITY,
+        Err(said) => {
+            eprintln!("stress: {said}");
+            f64::INFINITY
+        }
+    }
+}
+
+/// Gaps down to 1e-12 of the side, strips up to 1e7 times as long as wide.
+fn gaps_and_strips() -> Vec<Row> {
+    let mut rows = Vec::new();
+    for power in 1..=12 {
+        let gap = 10f64.powi(-power);
+        // Corners within 1e-9 of the diagonal (1.4e-9 here) are one corner: such faces touch, with no air between.
+        let (want, limit, reason) = match power {
+            ..=8 => (opposed(1.0, 1.0, gap), TOLERANCE, BOUND),
+            _ => (0.0, 0.0, "below the welding distance, 1e-9 of the diagonal: the faces touch, F = 0"),
+        };
+        let got = error(&opposed_faces(1.0, 1.0, gap), &[], &[], want);
+        rows.push(Row::new(format!("opposed unit squares, gap 1e-{power}"), got, limit, reason));
+    }
+    for power in 1..=7 {
+        let width = 10f64.powi(-power);
+        let got = error(&opposed_faces(1.0, width, width), &[], &[], opposed(1.0, width, width));
+        rows.push(Row::new(format!("strips of aspect 1e{power} at their width"), got, TOLERANCE, BOUND));
+    }
+    rows
+}
+
+/// Edge-sharing squares from nearly closed to nearly flat.
+fn wedges() -> Vec<Row> {
+    // Hottel & Sarofim's perpendicular squares with a common edge, 13 digits.
+    let right = 0.200_043_776_075_4;
+    let quarter = std::f64::consts::FRAC_PI_2;
+    let mut rows = vec![
+        Row::new("wedge of 90 degrees", error(&wedge(quarter), &[], &[], right), TOLERANCE, BOUND),
+        Row::new(
+            "wedge of 90 degrees, hemicube of 51 cells",
+            error(&wedge(quarter), &[], &["--method", "hemicube", "--resolution", "51"], right),
+            0.06 * right,
+            "the centre's factor is 4.95 % below the mean; 1 % for cells",
+        ),
+    ];
+    for tilt in [1e-3, 1e-6, 1e-9, 1e-12] {
+        let got = error(&wedge(std::f64::consts::PI - tilt), &[], &[], 0.0);
+        rows.push(Row::new(
+            format!("nearly flat wedge, tilt {tilt:e}"),
+            got,
+            tilt,
+            "long plates: 1 - cos(tilt / 2), below the tilt; never negative",
+        ));
+    }
+    for angle in [1e-1, 1e-3] {
+        let sum = factors(&wedge(angle), &[], &[]).map_or(f64::INFINITY, |f| f[0].iter().sum());
+        let above = (sum - 1.0).max(0.0);
+        rows.push(Row::new(format!("row sum above 1, wedge of {angle:e}"), above, TOLERANCE, BOUND));
+    }
+    rows
+}
+
+/// Sizes and places: the factors are those of the unit squares.
+fn scales_and_offsets() -> Vec<Row> {
+    let plain = factors(&opposed_faces(1.0, 1.0, 1.0), &[], &[]).unwrap()[0][1];
+    let mut rows = Vec::new();
+    for power in (-9..=9).step_by(3) {
+        let s = 10f64.powi(power);
+        let got = error(&opposed_faces(s, s, s), &[], &[], plain);
+        rows.push(Row::new(format!("scale 1e{power}"), got, 1e-12, "ratios of lengths only, some ulp each"));
+    }
+    let mut moved = opposed_faces(1.0, 1.0, 1.0);
+    moved.iter_mut().flat_map(|s| &mut s.corners).flatten().for_each(|x| *x += 1e6);
+    let got = error(&moved, &[], &[], plain);
+    rows.push(Row::new("offset 1e6", got, 1e-9, "half an ulp of 1e6 is 6e-11; a few of them"));
+    rows
+}
+
+/// Closed rooms whose surfaces all emit 1 and reflect rho: B = 1 / (1 - rho).
+fn furnaces() -> Vec<Row> {
+    let furnace = |name: &str, surfaces: Vec<Surface>, rho: f64, tolerance: &str| {
+        let folder = tests::folder();
+        let surfaces: Vec<Surface> = surfaces.into_iter().map(|s| s.painted(Paint::grey(rho, 1.0))).collect();
+        let mut chain = Chain::as_given(write(folder.path(), &surfaces), folder.path());
+        chain.matrix_flags = ["--tolerance", tolerance, "--precision", "f64"].map(str::to_owned).to_vec();
+        for stage in [Stage::Build, Stage::Compute, Stage::Solve] {
+            let done = run(&mut chain.command(stage));
+            if !matches!(done.code, Some(0 | 3)) {
+                eprintln!("stress: {name}: {}", done.stderr);
+                return f64::INFINITY;
+            }
+        }
+        let table = chain.radiosities("element");
+        let off = |row: usize| (table.number(row, "B_r") * (1.0 - rho) - 1.0).abs();
+        (0..table.rows.len()).map(off).fold(0.0, f64::max)
+    };
+    let mut rows = Vec::new();
+    for (name, loss) in [("0.9", 0.1), ("0.999", 1e-3), ("1 - 1e-6", 1e-6), ("1 - 1e-9", 1e-9)] {
+        let got = furnace(name, room([1.0, 2.0, 3.0]), 1.0 - loss, "1e-6");
+        let limit = 1e-6 + 64.0 * f64::EPSILON / loss;
+        let reason = "the solver's tolerance, and 64 ulp of a closed row times 1 / (1 - rho)";
+        rows.push(Row::new(format!("furnace of reflectance {name}"), got, limit, reason));
+    }
+    let quads = boxes::quads(0, 20).into_iter().map(|quad| Surface::new("q", quad)).collect();
+    let got = furnace("emitters", quads, 0.5, "1e-3");
+    rows.push(Row::new("2400 emitters", got, 2e-3, "row errors times 1 / (1 - rho)"));
+    rows
+}
+
+/// Very few elements, many at one place, points at a wall's foot.
+fn few_and_many() -> Vec<Row> {
+    let mut rows = Vec::new();
+    let one = vec![opposed_faces(1.0, 1.0, 1.0).remove(0).painted(Paint::grey(0.5, 1.0))];
+    let folder = tests::folder();
+    let chain = Chain::as_given(write(folder.path(), &one), folder.path());
+    chain.solve();
+    let lone = (chain.radiosities("element").number(0, "B_r") - 1.0).abs();
+    rows.push(Row::new("one element: B = E", lone, 1e-15, "pi times E / pi, rounded twice"));
+    let mut crowd = opposed_faces(1.0, 1.0, 1.0);
+    let copies = (0..199).map(|_| crowd[0].clone()).collect::<Vec<_>>();
+    crowd.extend(copies);
+    let got = error(&crowd, &[], &[], tests::two_squares::FORM_FACTOR);
+    rows.push(Row::new("200 coincident faces", got, TOLERANCE, BOUND));
+
+    let mut corner = wedge(std::f64::consts::FRAC_PI_2);
+    corner[1].paint = Paint::grey(0.0, 1.0);
+    let folder = tests::folder();
+    let chain = Chain::as_given(write(folder.path(), &corner), folder.path()).with_tolerances("1e-6", "1e-6");
+    chain.solve();
+    for power in [3, 6, 9] {
+        let d = 10f64.powi(-power);
+        let probed = chain.probe(&[[d, 0.5, 0.0, 0.0, 0.0, 1.0]]).number(0, "H_r");
+        let limit = 2.0 * d + 1e-6;
+        let reason = "the limit is 1/2; a wall of height 1 misses d / 2, its ends less; 1e-6 for the light";
+        rows.push(Row::new(
+            format!("point 1e-{power} from a wall's foot"),
+            (probed - 0.5).abs(),
+            limit,
+            reason,
+        ));
+    }
+    rows
+}
+
+/// Eyes where no eye should be: every pixel is a number.
+fn eyes() -> Vec<Row> {
+    let folder = tests::folder();
+    let chain = Chain::new(tests::scene("cornell_blocks.obj"), folder.path(), 200);
+    chain.run_all();
+    let eyes = [
+        ("in the floor", "278,0,280", "278,300,500"),
+        ("on a vertex", "130,165,65", "278,300,500"),
+        ("inside a block", "185,80,170", "278,300,500"),
+        ("in a block's top", "185,165,170", "278,200,500"),
+    ];
+    let mut rows = Vec::new();
+    for (name, eye, at) in eyes {
+        let mut command = chain.command(Stage::Render);
+        let done = run(command.args(["--eye", eye, "--look-at", at]));
+        let exr = chain.path("exr");
+        let compared = run(tool("shade-tool").arg("compare").arg(&exr).arg(&exr).arg("--json"));
+        let json: serde_json::Value = serde_json::from_str(&compared.stdout).unwrap_or_default();
+        let not_finite = json["channels"].as_array().map_or(f64::INFINITY, |channels| {
+            channels.iter().map(|c| c["not_finite"].as_f64().unwrap_or(f64::INFINITY)).sum()
+        });
+        let bad = if matches!(done.code, Some(0 | 3)) { not_finite } else { f64::INFINITY };
+        rows.push(Row::new(format!("eye {name}: pixels that are no number"), bad, 0.0, "none may be"));
+    }
+    rows
+}
+
+/// The scenes of tests/scenes/stress: refused by name, or right.
+fn folder_scenes() -> Vec<Row> {
+    const REFUSED: [&str; 3] = ["stress_nan", "stress_rho_gt1", "furnace_100"];
+    let mut names: Vec<String> = std::fs::read_dir(tests::scene("stress"))
+        .unwrap()
+        .filter_map(|e| Some(e.unwrap().file_name().to_str()?.strip_suffix(".obj")?.to_owned()))
+        .collect();
+    names.sort();
+    let mut rows = Vec::new();
+    for name in names {
+        let folder = tests::folder();
+        let chain = Chain::new(tests::scene(&format!("stress/{name}.obj")), folder.path(), 900);
+        let stages = [Stage::Build, Stage::Compute, Stage::Solve];
+        let failed =
+            stages.into_iter().map(|s| run(&mut chain.command(s))).find(|d| !matches!(d.code, Some(0 | 3)));
+        if REFUSED.contains(&name.as_str()) {
+            let clear = failed.is_some_and(|d| d.code == Some(1) && d.stderr.contains(": error: "));
+            let left = clear && !chain.path("sol").exists();
+            rows.push(Row::new(
+                format!("{name}: refused"),
+                f64::from(u8::from(!left)),
+                0.0,
+                "one clear message",
+            ));
+            continue;
+        }
+        if let Some(done) = failed {
+            eprintln!("stress: {name}: {}", done.stderr);
+            rows.push(Row::new(name, f64::INFINITY, 0.05, "must be computed"));
+            continue;
+        }
+        rows.push(scene_row(&name, &chain));
+    }
+    rows
+}
+
+/// The irradiance of a scene of the folder against its answers.
+fn scene_row(name: &str, chain: &Chain) -> Row {
+    let own = tests::reference(&format!("stress/{name}.csv"));
+    let points = if own.exists() {
+        Table::read(&own)
+    } else {
+        Table::read(&tests::reference("stress/stress_ref.csv"))
+    };
+    let scale = if name.contains("tiny") {
+        1e-6
+    } else if name.contains("huge") {
+        1e6
+    } else {
+        1.0
+    };
+    let extra = tests::scene(&format!("stress/{name}.extra.json"));
+    let exact = extra.exists().then(|| {
+        let json: serde_json::Value = serde_json::from_str(&tests::text(&extra)).unwrap();
+        json["exact_irradiance_E"][0].as_f64().unwrap()
+    });
+    let place = |row: usize| {
+        let at = ["x", "y", "z"].map(|c| points.number(row, c) * scale);
+        let normal = ["nx", "ny", "nz"].map(|c| points.number(row, c));
+        [at[0], at[1], at[2], normal[0], normal[1], normal[2]]
+    };
+    let places: Vec<[f64; 6]> = (0..points.rows.len()).map(place).collect();
+    let table = chain.probe(&places);
+    let got: Vec<[f64; 3]> =
+        (0..places.len()).map(|row| ["H_r", "H_g", "H_b"].map(|c| table.number(row, c))).collect();
+    if name.contains("nolight") {
+        let most = got.iter().flatten().fold(0.0, |most: f64, h| most.max(h.abs()));
+        return Row::new(format!("{name}: largest irradiance"), most, 0.0, "no light, no irradiance");
+    }
+    match exact {
+        // The furnaces' answer holds where the room is seen; points inside their block see nothing.
+        Some(exact) => {
+            let seen: Vec<[f64; 3]> = got.into_iter().filter(|h| h[0] > 0.0).collect();
+            let reason = "exact answer; 1e-3 in the matrix's rows times 1 / (1 - rho), closed";
+            Row::new(
+                format!("{name}: rms over points"),
+                rms(&seen, &vec![[exact; 3]; seen.len()]),
+                0.02,
+                reason,
+            )
+        }
+        None => {
+            let reason = "900 elements: a twentieth; the answers' own error is far less";
+            Row::new(format!("{name}: rms over points"), rms(&got, &given(&points)), 0.05, reason)
+        }
+    }
+}
+
+#[test]
+fn every_row_meets_its_number() {
+    let parts: [fn() -> Vec<Row>; 7] =
+        [gaps_and_strips, wedges, scales_and_offsets, furnaces, few_and_many, eyes, folder_scenes];
+    let rows: Vec<Row> = parts.into_iter().flat_map(|part| part()).collect();
+    println!("{}", table(&rows));
+    if let Some(path) = std::env::var_os("STRESS_INTO") {
+        tests::proof::table::put(path.as_ref(), "stress", &table(&rows));
+    }
+    let missed: Vec<&Row> = rows.iter().filter(|row| !row.met()).collect();
+    assert!(missed.is_empty(), "{missed:#?}");
+}
