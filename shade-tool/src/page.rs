@@ -12,8 +12,8 @@ mod plot;
 mod scene_data;
 mod stages;
 
-use crate::command_line::ends_in;
 use crate::error::Result;
+use crate::flag_values::ends_in;
 use clap::Args;
 use input::Input;
 use interchange::atomic_write::{self, refuse_input};
