@@ -14,7 +14,7 @@ use std::f64::consts::PI;
 
 /// The pairs of two clusters together may take so many times their share: all pairs of a row that look past something
 /// have a share, most of them are wholly seen or hidden and take nothing of it.
-const OF_POINTS: f64 = 3.0;
+const OF_POINTS: f64 = 2.0;
 /// Below this error of a factor relative to its value without blockers single points are not tried.
 const ONE_POINT: f64 = 0.02;
 /// Below this a few points are not tried either: too many pairs would be computed twice.

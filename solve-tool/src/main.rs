@@ -83,7 +83,7 @@ enum Command {
         /// Do work that is known to change nothing; several with commas between
         #[arg(long, value_name = "NAME", value_enum, value_delimiter = ',')]
         no_skip: Vec<Skip>,
-        /// Error to be proved, relative to the emitted power: sum of A |error of B| over sum of A E; auto and cg stop at a tenth
+        /// Error to be proved, relative to the emitted power: sum of A |error of B| over sum of A E; auto and cg stop at 0.03 of it
         #[arg(long, value_name = "E", default_value = "1e-6", value_parser = positive)]
         tolerance: f64,
     },

@@ -46,7 +46,7 @@ impl Solver {
     }
 
     /// Where the iteration stops for an error of `tolerance` asked of the whole solution. Where a product more costs next to nothing
-    /// it takes a tenth and leaves the rest to the matrix: the bound is on all light together, and dark places in
+    /// it takes little and leaves the rest to the matrix: the bound is on all light together, and dark places in
     /// single channels are off by several times as much (0.15 in a gap under a block at a bound of 0.02).
     pub fn stops_at(self, tolerance: f64) -> f64 {
         match self {
@@ -57,7 +57,7 @@ impl Solver {
 }
 
 /// Share of the asked error that the iteration takes, down to where rounding is near.
-const OWN_SHARE: f64 = 0.1;
+const OWN_SHARE: f64 = 0.03;
 const TIGHTEST: f64 = 1e-10;
 
 /// Improves iterates step by step, or at once.
