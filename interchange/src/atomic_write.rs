@@ -2,6 +2,7 @@
 //! the file that is already there leaves that file alone, time stamp included, so that `make` can stop there.
 
 use crate::error::{Error, Result};
+use crate::interrupt;
 use std::fs::{File, OpenOptions};
 use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -39,10 +40,9 @@ impl Partial {
     /// A new file under a name of its own.
     pub fn create(target: &Path) -> Result<Self> {
         refuse_folder(target)?;
-        let file = tempfile::Builder::new()
-            .prefix(&format!(".{}.", name_of(target)))
-            .suffix(".partial")
-            .tempfile_in(folder_of(target))
+        let (prefix, folder) = (format!(".{}.", name_of(target)), folder_of(target));
+        let make = || tempfile::Builder::new().prefix(&prefix).suffix(".partial").tempfile_in(folder);
+        let file = interrupt::make(make, |file: &NamedTempFile| file.path().to_owned())
             .map_err(|e| Error::io(target, "write beside", e))?;
         Ok(Self { target: target.to_owned(), file })
     }
@@ -60,11 +60,13 @@ impl Partial {
     }
 
     fn named(target: &Path, word: &str, options: &mut OpenOptions) -> Result<Self> {
-        let path = Self::path_for(target, word);
         let io = |e| Error::io(target, "write beside", e);
-        let file = options.read(true).write(true).open(&path).map_err(io)?;
         // An absolute path, so that it is found at the end whatever the working folder is by then.
-        let path = path.canonicalize().map_err(io)?;
+        let name = Self::path_for(target, word);
+        let folder = folder_of(target).canonicalize().map_err(io)?;
+        let path = folder.join(name.file_name().unwrap_or_default());
+        let open = || options.read(true).write(true).open(&path);
+        let file = interrupt::make(open, |_| path.clone()).map_err(io)?;
         let path = TempPath::try_from_path(path).map_err(io)?;
         Ok(Self { target: target.to_owned(), file: NamedTempFile::from_parts(file, path) })
     }
@@ -87,10 +89,18 @@ impl Partial {
     /// Whether the file stays where it is when it is dropped without a commit.
     pub fn keep_when_dropped(&mut self, keep: bool) {
         self.file.disable_cleanup(keep);
+        if keep { interrupt::leave(self.file.path()) } else { interrupt::take_up(self.file.path()) }
     }
 
     /// Syncs the file and renames it to its target, unless the target holds the same bytes.
-    pub fn commit(mut self) -> Result<Outcome> {
+    pub fn commit(self) -> Result<Outcome> {
+        let made = self.file.path().to_owned();
+        let outcome = self.replace_target();
+        interrupt::leave(&made);
+        outcome
+    }
+
+    fn replace_target(mut self) -> Result<Outcome> {
         let path = self.target.clone();
         let io = |action: &'static str| {
             let path = &path;

@@ -17,6 +17,7 @@ pub mod font;
 pub mod foreign;
 pub mod grouping;
 pub mod ids;
+mod interrupt;
 mod mapping;
 pub mod materials;
 pub mod materials_input;

@@ -52,8 +52,9 @@ pub struct Common {
 }
 
 impl Common {
-    /// Sets up talk on stderr and the thread pool; to be called once, first.
+    /// Sets up talk on stderr, the thread pool and what happens on Ctrl-C; to be called once, first.
     pub fn start(&self) {
+        crate::interrupt::clear_up_when_interrupted();
         let level = match (self.quiet, self.verbose) {
             (true, _) => tracing::Level::ERROR,
             (_, true) => tracing::Level::DEBUG,

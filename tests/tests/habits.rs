@@ -74,3 +74,45 @@ fn a_dash_is_standard_output() {
     }
     assert!(!folder.path().join("-").exists());
 }
+
+/// Interrupted while it computes, a tool ends by the signal and leaves no unfinished file; the old output stays.
+#[test]
+#[cfg(unix)]
+fn an_interrupt_leaves_no_unfinished_file() {
+    use std::os::unix::process::ExitStatusExt;
+    let folder = tests::folder();
+    let path = |name: &str| folder.path().join(name);
+    let scene = tests::root().join("tests/scenes/cornell_blocks.obj");
+    run(tool("mesh-tool").arg("build").arg(scene).arg("-o").arg(path("s.mesh")).args(["--elements", "6000"]))
+        .expect_code(0);
+    for (signal, number) in [("-INT", 2), ("-TERM", 15)] {
+        std::fs::write(path("s.ff"), "old").unwrap();
+        let mut running = tool("formfactor-tool")
+            .arg("compute")
+            .arg(path("s.mesh"))
+            .arg("-o")
+            .arg(path("s.ff"))
+            .args(["--tolerance", "1e-6", "--quiet"])
+            .spawn()
+            .unwrap();
+        let unfinished = || {
+            let names = std::fs::read_dir(folder.path()).unwrap().map(|entry| entry.unwrap().file_name());
+            names.filter(|name| name.to_string_lossy().ends_with(".partial")).count()
+        };
+        // With that tolerance the matrix takes minutes: it is on its way as soon as its file is there.
+        while unfinished() == 0 {
+            assert!(running.try_wait().unwrap().is_none(), "ended before it was interrupted");
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        assert!(
+            std::process::Command::new("kill")
+                .args([signal, &running.id().to_string()])
+                .status()
+                .unwrap()
+                .success()
+        );
+        assert_eq!(running.wait().unwrap().signal(), Some(number));
+        assert_eq!(unfinished(), 0);
+        assert_eq!(tests::text(&path("s.ff")), "old");
+    }
+}
