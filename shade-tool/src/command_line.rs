@@ -33,7 +33,7 @@ use std::path::{Path, PathBuf};
 /// Lines to try, in `--help` and the manual page.
 const EXAMPLES: [&str; 5] = [
     "shade-tool render box.sol --mesh box.mesh -o box.exr --png box.png --camera tests/scenes/cornell_blocks.toml",
-    "shade-tool page box.sol --mesh box.mesh --matrix box.ff --picture box.exr --figure picture=box.png -o box.html",
+    "shade-tool page box.sol --mesh box.mesh --matrix box.ff --picture box.exr --bounds bounded.sol --figure picture=box.png -o box.html",
     "shade-tool info box.exr",
     "shade-tool compare box.exr box.exr --max 0",
     "shade-tool probe box.sol --mesh box.mesh --points points.csv -o lit.csv",
