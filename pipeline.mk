@@ -37,7 +37,8 @@ SCENE ?= $(ROOT)tests/scenes/cornell_blocks.obj
 OUT   ?= out
 # Wished relative RMS error of the picture: mesh fineness and the stages' tolerances follow from it, see below.
 ERROR ?= 0.02
-# 2: mesh, factors and solution are made twice: half the elements first, then refined where that solution is worst.
+# 2: mesh, factors and solution are made twice: half the elements first, then refined where that solution is worst. Elements
+# that did not change keep their factors.
 PASSES ?= 1
 # 1: a stage that misses its tolerance (exit 3) stops the pipeline. Otherwise it warns and the pipeline goes on.
 STRICT ?=
@@ -153,15 +154,22 @@ program-text = $(patsubst $(BIN)%,%,$1)
 text.materials = $(call program-text,$(MESH_TOOL)) $(abspath $(SCENE)) $(notdir $(TOML))
 text.mesh = $(call program-text,$(MESH_TOOL)) $(abspath $(SCENE)) $(mesh_flags) $(refine)
 text.first.mesh = $(call program-text,$(MESH_TOOL)) $(abspath $(SCENE)) $(mesh_flags)
-text.first.ff = $(text.ff)
+text.first.ff = $(call program-text,$(FORMFACTOR_TOOL)) $(ff_flags) $(raw)
 text.first.sol = $(text.sol)
-text.ff   = $(call program-text,$(FORMFACTOR_TOOL)) $(ff_flags)
+text.ff   = $(call program-text,$(FORMFACTOR_TOOL)) $(ff_flags) $(reuse)
 text.sol  = $(call program-text,$(SOLVE_TOOL)) $(solve_flags)
 text.exr  = $(call program-text,$(SHADE_TOOL)) $(subst $(TOML),$(abspath $(TOML)),$(shade_flags))
 
 # With PASSES=2 the mesh is refined by the solution of the first pass, whose files are called NAME.first.*.
 first  := $(P).first
 refine := $(if $(twice),--refine-with $(first).sol)
+
+# The second matrix takes the factors of elements that did not change from the first, which therefore is not closed. Programs
+# that go by another name are not asked to, nor are methods that cannot.
+reuses := $(and $(twice),$(filter formfactor-tool,$(notdir $(firstword $(FORMFACTOR_TOOL)))),$(call unless,$(FF_FLAGS),--method --reuse,yes))
+reused := $(if $(reuses),$(first).ff $(first).mesh)
+reuse  := $(if $(reuses),--reuse $(first).ff --reuse-mesh $(first).mesh)
+raw    := $(if $(reuses),$(call unless,$(FF_FLAGS),--closure,--closure report))
 
 # ---- How a stage runs: the one place that knows exit codes -----------------------------------------------------------
 
@@ -209,7 +217,7 @@ $(first).mesh.made: $(call inputs,$(SCENE)) $(P).surfaces $(first).mesh.flags $(
 $(first).mesh: $(first).mesh.made ; +
 $(first).ff.made: $(first).mesh $(first).ff.flags $(call named,$(FF_FLAGS)) \
     $(call program,FORMFACTOR_TOOL) $(call again,$(first).ff)
-	$(call stage,$(FORMFACTOR_TOOL) compute $(first).mesh -o $(first).ff $(ff_flags))
+	$(call stage,$(FORMFACTOR_TOOL) compute $(first).mesh -o $(first).ff $(ff_flags) $(raw))
 $(first).ff: $(first).ff.made ; +
 $(first).sol.made: $(first).ff $(first).mesh $(P).materials $(first).sol.flags $(call named,$(SOLVE_FLAGS)) \
     $(call program,SOLVE_TOOL) $(call again,$(first).sol)
@@ -219,16 +227,16 @@ endif
 
 # Form factors: what every element sees of every other.
 ifeq ($(shards),)
-$(P).ff.made: $(P).mesh $(P).ff.flags $(call named,$(FF_FLAGS)) \
+$(P).ff.made: $(P).mesh $(reused) $(P).ff.flags $(call named,$(FF_FLAGS)) \
     $(call program,FORMFACTOR_TOOL) $(call again,$(P).ff)
-	$(call stage,$(FORMFACTOR_TOOL) compute $(P).mesh -o $(P).ff $(ff_flags))
+	$(call stage,$(FORMFACTOR_TOOL) compute $(P).mesh -o $(P).ff $(ff_flags) $(reuse))
 else
 # The same in parts: name.1of4.ff and so on, and what puts them together.
 shard_files := $(shards:%=$(P).%of$(SHARDS).ff)
 define shard_rule
-$(P).$1of$(SHARDS).ff.made: $(P).mesh $(P).ff.flags $$(call named,$$(FF_FLAGS)) \
+$(P).$1of$(SHARDS).ff.made: $(P).mesh $(reused) $(P).ff.flags $$(call named,$$(FF_FLAGS)) \
     $$(call program,FORMFACTOR_TOOL) $$(call again,$(P).$1of$(SHARDS).ff)
-	$$(call stage,$$(FORMFACTOR_TOOL) compute $(P).mesh -o $(P).$1of$(SHARDS).ff --shard $1/$(SHARDS) $$(ff_flags))
+	$$(call stage,$$(FORMFACTOR_TOOL) compute $(P).mesh -o $(P).$1of$(SHARDS).ff --shard $1/$(SHARDS) $$(ff_flags) $(reuse))
 $(P).$1of$(SHARDS).ff: $(P).$1of$(SHARDS).ff.made ; +
 endef
 $(foreach i,$(shards),$(eval $(call shard_rule,$i)))

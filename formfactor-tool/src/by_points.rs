@@ -118,7 +118,7 @@ impl Filling<'_> {
         let (first_start, second_start) = (first.range.start, second.range.start);
         let (mut cut, mut full) = (Vec::new(), vec![Vec::new(); first.len()]);
         for i in first.range.clone() {
-            for j in second.range.clone() {
+            for j in second.range.clone().filter(|&j| !self.exact.reuse.has(i, j)) {
                 match facing(&patches[i], &patches[j]) {
                     Facing::Away => counts.behind += 1,
                     Facing::Cut => cut.push((i, j)),

@@ -9,6 +9,7 @@
 //! Whether a scene is open is told by its row sums alone: where one falls short of 1 by more than its own estimated error.
 
 mod passes;
+pub mod raw;
 #[cfg(test)]
 mod tests;
 

@@ -5,6 +5,8 @@ use crate::journal::{self, Journal, Run};
 use crate::method::Choice;
 use crate::options::{Shard, Storage};
 use crate::plan;
+use crate::reuse::Reuse;
+use crate::reuse::source::{OldMatrix, Source};
 use crate::scene::Scene;
 use crate::schedule::in_order;
 use crate::shards;
@@ -31,6 +33,8 @@ pub struct Request {
     pub tolerance: f64,
     /// How the entries are computed.
     pub method: Choice,
+    /// An old matrix to take entries from.
+    pub reuse: OldMatrix,
     /// Skips turned off.
     pub no_skip: Vec<Skip>,
     /// How the matrix is stored.
@@ -39,7 +43,8 @@ pub struct Request {
 
 /// Computes the matrix of a mesh and writes it with its report.
 pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
-    refuse_input(&request.output, [request.mesh.as_path()])?;
+    let old_files = request.reuse.reuse.iter().chain(&request.reuse.reuse_mesh);
+    refuse_input(&request.output, std::iter::once(&request.mesh).chain(old_files).map(PathBuf::as_path))?;
     let tolerance = request.tolerance;
     let skips = Skips::without(&request.no_skip);
     let mut report = Report::new("formfactor-tool", env!("CARGO_PKG_VERSION"));
@@ -50,7 +55,21 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     let scene = report.phase("prepare", || Scene::new(&mesh, &skips))?;
     let (pairs, settled) = report.phase("traverse", || leaf_pairs(&scene, &skips));
 
-    let estimator = report.phase("look", || request.method.estimator(&scene, &skips, &pairs, tolerance));
+    let wanted = skips.has(Skip::Reuse).then_some(&request.reuse);
+    let source = report.phase("open reused", || wanted.map_or(Ok(None), Source::open))?;
+    let reuse = match &source {
+        None => Reuse::nothing(),
+        Some(source) => {
+            source.reuse((&mesh, &scene), &request.method, tolerance)?.unwrap_or_else(|refusal| {
+                report.warn(format!("{}: nothing is reused: {refusal}", source.path().display()));
+                Reuse::nothing()
+            })
+        }
+    };
+    let mut inputs = vec![("mesh", digest)];
+    inputs.extend(source.iter().filter(|_| !reuse.is_nothing()).flat_map(Source::inputs));
+    let estimator =
+        report.phase("look", || request.method.estimator(&scene, &skips, &reuse, &pairs, tolerance));
     let shard = request.storage.shard.unwrap_or(Shard { part: 0, parts: 1 });
     let all_pairs = pairs.len();
     let pairs = shards::pairs_of(pairs, estimator.as_ref(), shard);
@@ -63,7 +82,7 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
         print_data(&plan::describe(
             &scene,
             &pairs,
-            &settled,
+            (&settled, &reuse),
             estimator.as_ref(),
             precision,
             memory,
@@ -87,10 +106,11 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     };
     let mut run_flags = report.flags.clone();
     run_flags.extend(request.no_skip.iter().map(|skip| format!("--no-skip {skip:?}")));
+    run_flags.extend(inputs[1..].iter().map(|(role, digest)| format!("{role} {digest}")));
     let run = Run::new(digest.to_string(), run_flags, &pairs);
     let begun = journal::begin(&request.output, &run, request.storage.resume)?;
     begun.notice.iter().for_each(|notice| report.warn(notice.as_str()));
-    let origin = provenance(&report.flags, digest);
+    let origin = provenance(&report.flags, &inputs);
     let mut store = Store::create(begun.work, origin, record, packing.areas())?;
     store.writer.keep_when_dropped(request.storage.resume);
     let (mut journal, resumed) = match begun.leftover {
@@ -107,8 +127,9 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
         }
     };
     journal.keep_when_dropped(request.storage.resume);
-    // Parts count what whole clusters settled once.
+    // Parts count what whole clusters settled once, and state once what the old entries of a row may be off by.
     if shard.part == 0 {
+        store.state(&packing, |i| reuse.error(i));
         store.counts.same_plane += settled.same_plane;
         store.counts.behind += settled.behind;
         store.counts.covered += settled.covered;
@@ -143,6 +164,7 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     report.count("pairs of one plane, by whole clusters", settled.same_plane);
     report.count("pairs facing away, by whole clusters", settled.behind);
     report.count("pairs fully blocked, by whole clusters", settled.covered);
+    report.count("elements with reused factors", reuse.elements());
     report.count("tiles", pairs.len());
     report.count("memory bound in bytes", memory.bound as usize);
     report.count("tiles resumed", resumed);
@@ -155,9 +177,10 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
 }
 
 /// Where a matrix with these flags comes from.
-fn provenance(flags: &[String], mesh: Digest) -> Provenance {
+fn provenance(flags: &[String], inputs: &[(&str, Digest)]) -> Provenance {
     let origin = Provenance::new("formfactor-tool", env!("CARGO_PKG_VERSION"));
-    flags.iter().fold(origin, |origin, flag| origin.flag(flag.as_str())).input("mesh", mesh)
+    let origin = flags.iter().fold(origin, |origin, flag| origin.flag(flag.as_str()));
+    inputs.iter().fold(origin, |origin, (role, digest)| origin.input(role, *digest))
 }
 
 fn largest(values: &[f64]) -> f64 {

@@ -31,6 +31,9 @@ pub struct Counts {
     pub exhausted: usize,
     /// Pairs computed from both sides.
     pub computed_twice: usize,
+    /// Taken from an older matrix.
+    #[serde(default)]
+    pub reused: usize,
 }
 
 impl Counts {
@@ -68,6 +71,7 @@ impl Counts {
         self.visible_parts += other.visible_parts;
         self.exhausted += other.exhausted;
         self.computed_twice += other.computed_twice;
+        self.reused += other.reused;
     }
 
     /// Writes the counters into a report.
@@ -84,6 +88,7 @@ impl Counts {
         report.count("pairs partly occluded", self.occluded);
         report.count("pairs past blockers, by points of both sides", self.by_points);
         report.count("pairs partly occluded, out of evaluations", self.exhausted);
+        report.count("pairs reused", self.reused);
         report.count("pairs computed from both sides", self.computed_twice);
         report.count("visible parts computed", self.visible_parts);
     }

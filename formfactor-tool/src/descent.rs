@@ -14,6 +14,11 @@ use std::ops::Range;
 
 /// What the descent finds. Pairs it does not mention are zero.
 pub trait Findings {
+    /// How many of the pairs of two clusters are known already. Where all are, nothing is looked at.
+    fn known(&self, _first: &Cluster, _second: &Cluster) -> usize {
+        0
+    }
+
     /// Nothing stands between any of the rows and any of the columns; they need not see each other's front.
     fn clear(&mut self, first: &Cluster, second: &Cluster, counts: &mut Counts);
 
@@ -51,6 +56,9 @@ pub fn descend<'a>(
     scratch.shadows.clear();
     scratch.shadows.keep_covering(!skips.has(Skip::Covered));
     let [a, b] = pair.clusters;
+    if findings.known(&scene.clusters[a], &scene.clusters[b]) == pair.pairs() {
+        return;
+    }
     // The traversal has just found what may stand between the two: where the findings need no more, that is not asked again.
     if a != b && !pair.blockers.is_empty() {
         let bodies = || pair.blockers.iter().map(|&k| &scene.bodies[k as usize]).collect();
@@ -73,7 +81,11 @@ impl<'a, F: Findings> Descent<'a, '_, F> {
     /// Looks at clusters `a` and `b`, between which stand the shadows `which` and perhaps the bodies `pending`.
     fn visit(&mut self, a: usize, b: usize, which: Range<usize>, pending: &[u32], scratch: &mut Scratch<'a>) {
         let (first, second) = (&self.scene.clusters[a], &self.scene.clusters[b]);
-        let pairs = if a == b { first.len() * (first.len() + 1) / 2 } else { first.len() * second.len() };
+        let all = if a == b { first.len() * (first.len() + 1) / 2 } else { first.len() * second.len() };
+        let pairs = all - self.findings.known(first, second);
+        if pairs == 0 {
+            return;
+        }
         if self.skips.has(Skip::SamePlane) && first.shares_plane(second) {
             self.counts.same_plane += pairs;
             return;

@@ -11,6 +11,7 @@ use crate::estimator::{Estimator, TileBuilder};
 use crate::filling::Filling;
 use crate::point_views::PointViews;
 use crate::poses::Poses;
+use crate::reuse::Reuse;
 use crate::scene::Scene;
 use crate::sizes::occluded_sizes;
 use crate::skips::{Skip, Skips};
@@ -32,14 +33,23 @@ const UNOCCLUDED_LOOSEST: f64 = 2e-3;
 const OCCLUDED_SHARE: f64 = 0.7;
 /// From this tolerance on single points may serve partly occluded pairs.
 const POINTS_TOLERANCE: f64 = 3e-3;
+/// Work of taking over a known entry, in units of computing one past nothing.
+const COPIED: f64 = 0.05;
 /// Below this tolerance poses are not rounded: 1e-12 of a factor is to be had.
 const POSE_TOLERANCE: f64 = 1e-8;
+
+/// Relative error of an unoccluded factor where rows are asked for `tolerance`.
+pub fn unoccluded_error(tolerance: f64) -> f64 {
+    (UNOCCLUDED_SHARE * tolerance).min(UNOCCLUDED_LOOSEST)
+}
 
 /// The exact method on a scene.
 #[derive(Debug)]
 pub struct Exact<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) skips: &'a Skips,
+    /// Pairs that an older matrix knows.
+    pub(crate) reuse: &'a Reuse<'a>,
     /// Error asked of each row.
     pub(crate) tolerance: f64,
     /// Relative error of an unoccluded factor.
@@ -62,24 +72,33 @@ pub(crate) struct Far {
 }
 
 impl<'a> Exact<'a> {
-    /// For rows within `tolerance`.
-    pub fn new(scene: &'a Scene, skips: &'a Skips, pairs: &[LeafPair], tolerance: f64) -> Self {
+    /// For rows within `tolerance`, of which entries of `reuse` have had their part.
+    pub fn new(
+        scene: &'a Scene,
+        skips: &'a Skips,
+        reuse: &'a Reuse<'a>,
+        pairs: &[LeafPair],
+        tolerance: f64,
+    ) -> Self {
         let is_loose = tolerance >= POINTS_TOLERANCE && skips.has(Skip::PointViews);
-        let points = is_loose.then(|| PointViews::new(scene));
-        let sizes = occluded_sizes(scene, skips, pairs, is_loose);
-        let occluded = sizes.iter().map(|&size| OCCLUDED_SHARE * tolerance / size.max(tolerance)).collect();
-        let unoccluded = (UNOCCLUDED_SHARE * tolerance).min(UNOCCLUDED_LOOSEST);
+        let points = is_loose.then(|| PointViews::new(scene, reuse));
+        let sizes = occluded_sizes(scene, skips, reuse, pairs, is_loose);
+        // What entries that are known may be off by is taken off the partly occluded pairs' share, not off the tolerance: they are
+        // allowed more than their share, counting on most to take less, and fewer pairs are less of a crowd.
+        let left = |i: usize| OCCLUDED_SHARE * tolerance - reuse.error(i);
+        let occluded = sizes.iter().enumerate().map(|(i, size)| left(i) / size.max(tolerance)).collect();
+        let unoccluded = unoccluded_error(tolerance);
         let far = Far { low: FarPatches::low(&scene.patches), middle: FarPatches::middle(&scene.patches) };
         let clusters = ClusterRule::new(scene, unoccluded);
         let poses =
             (tolerance >= POSE_TOLERANCE).then(|| Poses::new(unoccluded, skips.has(Skip::EqualPoses)));
-        Self { scene, skips, tolerance, unoccluded, occluded, far, clusters, poses, points }
+        Self { scene, skips, reuse, tolerance, unoccluded, occluded, far, clusters, poses, points }
     }
 
     fn one_way(&self, pair: &LeafPair) -> Tile {
-        let builder = TileBuilder::zeros(pair);
+        let mut builder = TileBuilder::zeros(pair);
+        let mut counts = Counts { reused: self.reuse.copy(pair, &mut builder), ..Counts::default() };
         let mut filling = Filling::new(self, pair, builder);
-        let mut counts = Counts::default();
         descend(self.scene, self.skips, pair, &mut filling, &mut counts, &mut Scratch::default());
         *filling.builder.counts() = counts;
         filling.builder.finish()
@@ -110,7 +129,8 @@ impl Estimator for Exact<'_> {
     }
 
     fn work(&self, pair: &LeafPair) -> f64 {
-        pair.pairs() as f64 * (1.0 + pair.blockers.len() as f64)
+        let known = self.reuse.known(pair.clusters[0], pair.clusters[1]);
+        (pair.pairs() - known) as f64 * (1.0 + pair.blockers.len() as f64) + COPIED * known as f64
     }
 
     fn allow(&self, bytes: u64) {

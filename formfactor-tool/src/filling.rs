@@ -95,7 +95,8 @@ impl<'e> Filling<'e> {
     ) {
         let patches = &self.exact.scene.patches;
         for (i, values) in rows.zip(values.chunks_exact(columns.len())) {
-            for (j, &value) in columns.clone().zip(values) {
+            let computed = columns.clone().zip(values).filter(|(j, _)| !self.exact.reuse.has(i, *j));
+            for (j, &value) in computed {
                 let error = error * patches[i].area * patches[j].area;
                 if error <= MOST_RELATIVE * self.exact.unoccluded * value {
                     counts.by_clusters += 1;
@@ -111,7 +112,7 @@ impl<'e> Filling<'e> {
     fn row_in_front(&mut self, i: usize, columns: Range<usize>, counts: &mut Counts) {
         let mut lists = std::mem::take(&mut self.lists);
         lists.pending.clear();
-        lists.pending.extend(columns.map(|j| j as u32));
+        lists.pending.extend(columns.filter(|&j| !self.exact.reuse.has(i, j)).map(|j| j as u32));
         self.exact.row_in_front(i, &mut lists, counts, |j, found| self.set(i, j, found));
         self.lists = lists;
     }
@@ -194,6 +195,10 @@ impl Filling<'_> {
 }
 
 impl Findings for Filling<'_> {
+    fn known(&self, first: &Cluster, second: &Cluster) -> usize {
+        self.exact.reuse.known(first.number, second.number)
+    }
+
     fn undecided<'a>(
         &mut self,
         clusters: (&'a Cluster, &'a Cluster),
@@ -210,7 +215,7 @@ impl Findings for Filling<'_> {
         }
         let patches = &self.exact.scene.patches;
         for i in first.range.clone() {
-            for j in second.range.clone() {
+            for j in second.range.clone().filter(|&j| !self.exact.reuse.has(i, j)) {
                 match facing(&patches[i], &patches[j]) {
                     Facing::Away => counts.behind += 1,
                     Facing::Full if self.exact.skips.has(Skip::FarRules) => {

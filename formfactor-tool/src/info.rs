@@ -1,5 +1,6 @@
 //! `formfactor-tool info`: what a matrix file holds, for people and as JSON.
 
+use crate::reuse::source::{REUSED_MATRIX, REUSED_MESH};
 use interchange::error::Result;
 use interchange::matrix::{BlockKind, Matrix};
 use interchange::report::Report;
@@ -104,6 +105,9 @@ pub fn describe(paths: &[impl AsRef<Path>], as_json: bool) -> Result<String> {
     }
     line("made by", format!("{} {} {}", provenance.tool, provenance.version, provenance.flags.join(" ")));
     line("mesh", record.mesh.short());
+    if let Some((matrix, mesh)) = provenance.digest_of(REUSED_MATRIX).zip(provenance.digest_of(REUSED_MESH)) {
+        line("reused", format!("factors of matrix {} for mesh {}", matrix.short(), mesh.short()));
+    }
     Ok(text)
 }
 

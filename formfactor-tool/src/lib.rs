@@ -36,6 +36,7 @@ pub mod plan;
 pub mod point_views;
 pub mod poses;
 pub mod rays;
+pub mod reuse;
 pub mod rows;
 pub mod scene;
 pub mod schedule;

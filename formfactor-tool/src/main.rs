@@ -7,15 +7,16 @@ use formfactor_tool::foreign::Format;
 use formfactor_tool::look::{self, Look};
 use formfactor_tool::options::Storage;
 use formfactor_tool::skips::Skip;
-use formfactor_tool::{compare, compute, export, import, info, merge, method, picture};
+use formfactor_tool::{compare, compute, export, import, info, merge, method, picture, reuse};
 use interchange::grouping::By;
 use interchange::tool::{Common, EXIT_CODES, Finish, examples, exit_code, not_negative, pages, print_data};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Lines to try, in `--help` and the manual page.
-const EXAMPLES: [&str; 7] = [
+const EXAMPLES: [&str; 8] = [
     "formfactor-tool compute box.mesh -o box.ff --tolerance 1e-3",
+    "formfactor-tool compute finer.mesh -o finer.ff --tolerance 1e-3 --reuse box.ff --reuse-mesh box.mesh",
     "formfactor-tool info box.ff",
     "formfactor-tool info box.ff --group floor light --mesh box.mesh",
     "formfactor-tool export box.ff --mesh box.mesh --by group -o factors.csv",
@@ -48,6 +49,8 @@ enum Command {
         tolerance: f64,
         #[command(flatten)]
         method: method::Flags,
+        #[command(flatten)]
+        reuse: reuse::source::OldMatrix,
         /// Do this work even where it is provably not needed
         #[arg(long, value_enum, value_name = "NAME", value_delimiter = ',')]
         no_skip: Vec<Skip>,
@@ -179,9 +182,9 @@ impl LookFlags {
 
 fn run(cli: Cli) -> anyhow::Result<Finish> {
     match cli.command {
-        Command::Compute { mesh, output, tolerance, method, no_skip, storage } => {
+        Command::Compute { mesh, output, tolerance, method, reuse, no_skip, storage } => {
             let method = method.choice().map_err(anyhow::Error::msg)?;
-            let request = compute::Request { mesh, output, tolerance, method, no_skip, storage };
+            let request = compute::Request { mesh, output, tolerance, method, reuse, no_skip, storage };
             return compute::run(&request, &cli.common);
         }
         Command::Merge { shards, output, closure } => {

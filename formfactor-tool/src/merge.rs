@@ -69,7 +69,7 @@ fn merged(shard: &Provenance, closure: Option<Closure>) -> Provenance {
 }
 
 /// The closure that a run with these flags was asked for.
-fn asked(flags: &[String]) -> Option<Closure> {
+pub(crate) fn asked(flags: &[String]) -> Option<Closure> {
     let value = flags.iter().find_map(|flag| flag.strip_prefix("--closure "))?;
     Closure::from_str(value, false).ok()
 }

@@ -5,6 +5,7 @@ use crate::estimator::Estimator;
 use crate::exact::Exact;
 use crate::hemicube::HemicubeRows;
 use crate::rays::RayRows;
+use crate::reuse::Reuse;
 use crate::rows::RowWise;
 use crate::scene::Scene;
 use crate::skips::Skips;
@@ -102,17 +103,19 @@ impl Choice {
         std::iter::once(format!("--method {name}")).chain(own).collect()
     }
 
-    /// The estimator on a scene, for rows within `tolerance` where the method can be asked for that.
+    /// The estimator on a scene, for rows within `tolerance` where the method can be asked for that. Entries are reused by
+    /// `auto` alone.
     pub fn estimator<'a>(
         &self,
         scene: &'a Scene,
         skips: &'a Skips,
+        reuse: &'a Reuse<'a>,
         pairs: &[LeafPair],
         tolerance: f64,
     ) -> Box<dyn Estimator + 'a> {
         let amount = self.amount.unwrap_or(1) as usize;
         match self.method {
-            Method::Auto => Box::new(Exact::new(scene, skips, pairs, tolerance)),
+            Method::Auto => Box::new(Exact::new(scene, skips, reuse, pairs, tolerance)),
             Method::Contour => Box::new(Classical::new(scene, Form::Contour, tolerance)),
             Method::Area => Box::new(Classical::new(scene, Form::Area, tolerance)),
             Method::Hemicube => Box::new(RowWise::new(scene, HemicubeRows::new(scene, amount))),

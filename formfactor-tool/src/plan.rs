@@ -2,6 +2,7 @@
 //! the run then keeps.
 
 use crate::estimator::Estimator;
+use crate::reuse::Reuse;
 use crate::scene::Scene;
 use crate::traversal::{LeafPair, Settled};
 use interchange::matrix::Precision;
@@ -85,14 +86,13 @@ pub fn resident() -> u64 {
 pub fn describe(
     scene: &Scene,
     pairs: &[LeafPair],
-    settled: &Settled,
+    (settled, reuse): (&Settled, &Reuse<'_>),
     estimator: &dyn Estimator,
     precision: Precision,
     memory: Memory,
     threads: usize,
 ) -> String {
     let n = scene.len();
-    let sum = |of: &dyn Fn(&&LeafPair) -> bool| pairs.iter().filter(of).map(LeafPair::pairs).sum::<usize>();
     let seconds: f64 = pairs.iter().map(|pair| estimator.nanoseconds(pair)).sum::<f64>() * 1e-9;
     let entries: u64 = pairs.iter().map(|pair| pair.pairs() as u64).sum();
     let bytes = entries * precision.bytes() as u64 + pairs.len() as u64 * PER_TILE + n as u64 * 16;
@@ -107,6 +107,11 @@ pub fn describe(
     line("  of one plane", settled.same_plane.to_string());
     line("  facing away", settled.behind.to_string());
     line("  fully blocked", settled.covered.to_string());
+    let known = |pair: &LeafPair| reuse.known(pair.clusters[0], pair.clusters[1]);
+    let sum = |of: &dyn Fn(&&LeafPair) -> bool| {
+        pairs.iter().filter(of).map(|pair| pair.pairs() - known(pair)).sum::<usize>()
+    };
+    line("  reused", pairs.iter().map(known).sum::<usize>().to_string());
     line("  nothing between", sum(&|pair| pair.blockers.is_empty()).to_string());
     line("  to be looked at", sum(&|pair| !pair.blockers.is_empty()).to_string());
     line("tiles", pairs.len().to_string());

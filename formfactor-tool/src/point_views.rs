@@ -7,6 +7,7 @@
 //! near each other, are not many: they are left to the adaptive rule, and so are the worst ones of a tile while its rows
 //! are above their share.
 
+use crate::reuse::Reuse;
 use crate::scene::{Cluster, Scene};
 use geometry::body::Body;
 use geometry::patch::{Patch, RulePoints};
@@ -46,6 +47,7 @@ impl Points {
 #[derive(Debug)]
 pub struct PointViews<'a> {
     scene: &'a Scene,
+    reuse: &'a Reuse<'a>,
     boxes: Vec<Bounds>,
 }
 
@@ -88,11 +90,11 @@ impl Shares {
 
 impl<'a> PointViews<'a> {
     /// Prepares a scene.
-    pub fn new(scene: &'a Scene) -> Self {
-        Self { scene, boxes: scene.clusters.iter().map(bounds).collect() }
+    pub fn new(scene: &'a Scene, reuse: &'a Reuse<'a>) -> Self {
+        Self { scene, reuse, boxes: scene.clusters.iter().map(bounds).collect() }
     }
 
-    /// What the points of two clusters' elements see of each other past these bodies.
+    /// What the points of two clusters' elements see of each other past these bodies; of pairs that are known, maybe nothing.
     pub fn shares(
         &self,
         (first, second): (&Cluster, &Cluster),
@@ -126,6 +128,8 @@ impl<'a> PointViews<'a> {
                     view.look(point, patch.plane.normal, &self.boxes[sources.number], bodies.iter().copied());
                 let mut walk = Walk {
                     scene: self.scene,
+                    reuse: self.reuse,
+                    receiver,
                     boxes: &self.boxes,
                     first: sources.range.start,
                     point,
@@ -146,6 +150,9 @@ impl<'a> PointViews<'a> {
 /// One point on its way through a cluster.
 struct Walk<'w> {
     scene: &'w Scene,
+    reuse: &'w Reuse<'w>,
+    /// Element of the point.
+    receiver: usize,
     boxes: &'w [Bounds],
     /// Number of the first source.
     first: usize,
@@ -160,6 +167,9 @@ struct Walk<'w> {
 impl Walk<'_> {
     fn visit(&mut self, number: usize, list: Range<usize>) {
         let cluster = &self.scene.clusters[number];
+        if self.reuse.has_all(self.receiver, cluster) {
+            return;
+        }
         if cluster.plane.is_some_and(|plane| plane.distance(self.point) <= 0.0) {
             return;
         }

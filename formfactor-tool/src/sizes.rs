@@ -3,6 +3,7 @@
 
 use crate::counts::Counts;
 use crate::descent::{Findings, descend};
+use crate::reuse::Reuse;
 use crate::scene::{Cluster, Scene};
 use crate::skips::{Skip, Skips};
 use crate::traversal::LeafPair;
@@ -21,6 +22,7 @@ const LOOKED_AT_TOGETHER: usize = 16;
 /// Adds up what stands behind blockers in part.
 struct Sizes<'e> {
     scene: &'e Scene,
+    reuse: &'e Reuse<'e>,
     pair: &'e LeafPair,
     of_rows: Vec<f64>,
     of_columns: Vec<f64>,
@@ -31,6 +33,9 @@ impl Sizes<'_> {
     fn add_all(&mut self) {
         for (i, of_row) in self.pair.rows.clone().zip(&mut self.of_rows) {
             for (j, of_column) in self.pair.columns.clone().zip(&mut self.of_columns) {
+                if self.reuse.has(i, j) {
+                    continue;
+                }
                 let (p, q) = (&self.scene.patches[i], &self.scene.patches[j]);
                 let most = p.area.min(q.area);
                 let size = Separation::new(p, q).value.min(most);
@@ -42,6 +47,10 @@ impl Sizes<'_> {
 }
 
 impl Findings for Sizes<'_> {
+    fn known(&self, first: &Cluster, second: &Cluster) -> usize {
+        self.reuse.known(first.number, second.number)
+    }
+
     fn clear(&mut self, _: &Cluster, _: &Cluster, _: &mut Counts) {}
 
     fn undecided<'a>(
@@ -66,13 +75,16 @@ impl Findings for Sizes<'_> {
         let cosine = |height: f64| (height / distance).clamp(0.25 * tilt, 1.0);
         let kernel =
             cosine(p.normal.dot(between)) * cosine(-q.normal.dot(between)) / (PI * distance * distance);
-        let area = |c: &Cluster| self.scene.patches[c.range.clone()].iter().map(|p| p.area).sum::<f64>();
-        let (area_p, area_q) = (area(first), area(second));
+        let area = |k: usize| self.scene.patches[k].area;
+        // What an element looks at of a cluster: all but what is known.
+        let areas = |c: &Cluster, k: usize| {
+            c.range.clone().filter(|&other| !self.reuse.has(k, other)).map(area).sum::<f64>()
+        };
         for i in first.range.clone() {
-            self.of_rows[i - self.pair.rows.start] += self.scene.patches[i].area * area_q * kernel;
+            self.of_rows[i - self.pair.rows.start] += area(i) * areas(second, i) * kernel;
         }
         for j in second.range.clone() {
-            self.of_columns[j - self.pair.columns.start] += self.scene.patches[j].area * area_p * kernel;
+            self.of_columns[j - self.pair.columns.start] += area(j) * areas(first, j) * kernel;
         }
         true
     }
@@ -91,10 +103,16 @@ impl Findings for Sizes<'_> {
     }
 }
 
-/// Per row the sum over its partly occluded pairs of the factors without blockers.
+/// Per row the sum over its partly occluded pairs, but for those that are known, of the factors without blockers.
 /// Where the tolerance is
 /// loose it may be too much: all pairs of two clusters count that something may stand between.
-pub(crate) fn occluded_sizes(scene: &Scene, skips: &Skips, pairs: &[LeafPair], is_loose: bool) -> Vec<f64> {
+pub(crate) fn occluded_sizes(
+    scene: &Scene,
+    skips: &Skips,
+    reuse: &Reuse<'_>,
+    pairs: &[LeafPair],
+    is_loose: bool,
+) -> Vec<f64> {
     // With nothing between them too, where they are not taken for that.
     let looked_at = |pair: &&LeafPair| !pair.blockers.is_empty() || !skips.has(Skip::EmptyShaft);
     let blocked: Vec<&LeafPair> = pairs.iter().filter(looked_at).collect();
@@ -102,7 +120,7 @@ pub(crate) fn occluded_sizes(scene: &Scene, skips: &Skips, pairs: &[LeafPair], i
         .par_iter()
         .map_init(Scratch::default, |scratch, pair| {
             let (of_rows, of_columns) = (vec![0.0; pair.rows.len()], vec![0.0; pair.columns.len()]);
-            let mut sizes = Sizes { scene, pair, of_rows, of_columns };
+            let mut sizes = Sizes { scene, reuse, pair, of_rows, of_columns };
             if is_loose && !pair.is_diagonal() {
                 sizes.add_all();
                 return sizes;

@@ -30,6 +30,8 @@ pub enum Skip {
     FarRules,
     /// At loose tolerances: partly occluded far pairs by what a few points of both elements see, not cut along shadow lines
     PointViews,
+    /// Elements that an older matrix (--reuse) has had: their factors are taken from it
+    Reuse,
 }
 
 /// Which skips are on.

@@ -172,6 +172,11 @@ impl Store {
         Ok(())
     }
 
+    /// Adds to the row errors what is no tile's.
+    pub fn state(&mut self, packing: &Packing, error: impl Fn(usize) -> f64) {
+        self.row_errors.iter_mut().enumerate().for_each(|(i, sum)| *sum += packing.round_up(error(i)));
+    }
+
     /// Keeps what is kept of a tile whose entries are written.
     pub fn note(&mut self, pair: &LeafPair, tile: &StoredTile) {
         self.absent_blocks += usize::from(tile.packed.is_none());

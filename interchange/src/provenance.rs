@@ -20,7 +20,8 @@ pub struct Provenance {
 /// One input of a stage.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Input {
-    /// What it served as: `scene`, `surfaces`, `mesh`, `matrix`, `materials`.
+    /// What it served as: `scene`, `surfaces`, `mesh`, `matrix`, `materials`, `factors`, `reused matrix`,
+    /// `reused mesh`.
     pub role: String,
     /// Identity: SHA-256 of a text file's bytes, or of a container's envelope and header.
     pub digest: Digest,

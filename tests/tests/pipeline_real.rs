@@ -75,6 +75,36 @@ fn stages(done: &Run) -> Vec<String> {
     done.stdout.lines().filter_map(command).collect()
 }
 
+/// The second matrix takes the factors of elements that did not change from the first, in one piece or in shards; a colour
+/// reaches it through the refined mesh only.
+#[test]
+fn two_passes_reuse_the_factors_of_unchanged_elements() {
+    let scene = Scene::new();
+    let reused = |ending: &str| {
+        let path = interchange::report::Report::path_for(&scene.output(ending));
+        interchange::report::Report::read(&path).unwrap().counters["pairs reused"]
+    };
+    let done = run(&mut scene.make(&["PASSES=2"])).expect_code(0);
+    let passes = [&ALL[1..4], &ALL[1..5]].concat();
+    assert_eq!(stages(&done)[1..], passes, "{}{}", done.stdout, done.stderr);
+    assert!(reused("ff") > 0 && reused("first.ff") == 0);
+    let again = run(&mut scene.make(&["PASSES=2"])).expect_code(0);
+    assert_eq!(again.stdout, "make: Nothing to be done for 'all'.\n", "{}", again.stderr);
+    let whole = bytes(&scene.output("ff"));
+    run(&mut scene.make(&["PASSES=2", "SHARDS=2"])).expect_code(0);
+    assert!(bytes(&scene.output("ff")) == whole);
+    assert!(reused("1of2.ff") + reused("2of2.ff") > 0);
+    // Another first matrix means another second one.
+    let done = run(&mut scene.make(&["PASSES=2", "FF_FLAGS=--tolerance 0.4"])).expect_code(0);
+    assert!(stages(&done).iter().filter(|stage| *stage == ALL[2]).count() == 2, "{}", done.stdout);
+    // A method that cannot reuse is not asked to.
+    let done = run(&mut scene.make(&["-n", "PASSES=2", "FF_FLAGS=--method area"])).expect_code(0);
+    assert!(!done.stdout.contains("--reuse") && !done.stdout.contains("--closure"), "{}", done.stdout);
+    run(&mut scene.make(&["PASSES=2", "clean"])).expect_code(0);
+    run(&mut scene.make(&["PASSES=2", "SHARDS=2", "clean"])).expect_code(0);
+    assert_eq!(std::fs::read_dir(scene.folder.path().join("out")).unwrap().count(), 0);
+}
+
 #[test]
 fn edits_rerun_exactly_the_stages_they_touch() {
     let scene = Scene::new();

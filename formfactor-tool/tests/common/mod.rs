@@ -87,3 +87,28 @@ pub fn clustered(polygons: &[Vec<[f64; 3]>], leaf: u32) -> Mesh {
     mesh.clusters.push(Cluster { start, end, first_child: 0, second_child: 0 });
     mesh
 }
+
+/// A mesh of faces that block, and elements on them with their faces; a leaf cluster for every `leaf` elements, in a chain.
+pub fn meshed(faces: &[Vec<[f64; 3]>], elements: &[(usize, Vec<[f64; 3]>)], leaf: u32) -> Mesh {
+    let blocking = mesh_of(faces);
+    let polygons: Vec<Vec<[f64; 3]>> = elements.iter().map(|(_, polygon)| polygon.clone()).collect();
+    let mut mesh = clustered(&polygons, leaf);
+    let offset = mesh.vertices.len();
+    mesh.vertices.extend(&blocking.vertices);
+    let moved = |corners: &[VertexId]| -> Vec<VertexId> {
+        corners.iter().map(|v| VertexId::new(offset + v.index())).collect()
+    };
+    (mesh.faces, mesh.occluders) = Default::default();
+    for corners in blocking.faces.rows() {
+        mesh.faces.push(moved(corners));
+        mesh.occluders.push(moved(corners));
+    }
+    mesh.occluder_faces = blocking.occluder_faces;
+    mesh.face_inputs = blocking.face_inputs;
+    mesh.face_groups = blocking.face_groups;
+    mesh.face_materials = blocking.face_materials;
+    mesh.face_flags = blocking.face_flags;
+    mesh.input_face_count = faces.len() as u32;
+    mesh.element_faces = elements.iter().map(|(face, _)| FaceId::new(*face)).collect();
+    mesh
+}

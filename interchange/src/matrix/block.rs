@@ -132,6 +132,26 @@ impl<'a> BlockView<'a> {
         });
     }
 
+    /// Entry S_ij of the block, 0 where it stores none there.
+    pub fn entry(&self, i: usize, j: usize) -> f64 {
+        let (rows, columns) = (self.block.rows as usize, self.block.columns as usize);
+        let row = i.checked_sub(self.block.row_start as usize).filter(|&row| row < rows);
+        let column = j.checked_sub(self.block.column_start as usize).filter(|&column| column < columns);
+        let Some((row, column)) = row.zip(column) else { return 0.0 };
+        match self.block.kind() {
+            Ok(BlockKind::Dense) => self.values.get(row * columns + column),
+            // Before row r of a triangle lie r rows, each one shorter than the last.
+            Ok(BlockKind::Triangle) if row <= column => {
+                self.values.get(row * (2 * columns - row + 1) / 2 + column - row)
+            }
+            Ok(BlockKind::Sparse) => match self.sparse_row(row).binary_search(&(column as u32)) {
+                Ok(k) => self.values.get(self.row_entries(row).start + k),
+                Err(_) => 0.0,
+            },
+            _ => 0.0,
+        }
+    }
+
     /// Of a sparse block: which of its entries lie in this row, counted from the block's first.
     pub fn row_entries(&self, row: usize) -> Range<usize> {
         self.structure[row] as usize..self.structure[row + 1] as usize

@@ -102,6 +102,10 @@ mod tests {
                     }
                 });
             });
+            for view in &views {
+                view.for_each(|i, j, s| assert_eq!(view.entry(i, j), s, "{i} {j}"));
+                assert_eq!((view.entry(9, 4), view.entry(2, 0)), (0.0, 0.0));
+            }
             for (i, wanted) in wanted.iter().enumerate() {
                 let (mut row, mut found) = (Vec::new(), [0.0; 5]);
                 views.iter().for_each(|view| view.entries_of(i, mirrored, &mut row));
