@@ -293,10 +293,9 @@ impl<const R: usize, T: Entry> Strip<'_, R, T> {
             let mut partial = [[[_mm256_setzero_pd(); 2]; K]; 2];
             for r in rows.clone() {
                 for k in 0..K {
-                    for half in 0..2 {
+                    for (half, sums) in partial[r - first][k].iter_mut().enumerate() {
                         // SAFETY: four values are read from half an array of eight.
-                        partial[r - first][k][half] =
-                            unsafe { _mm256_loadu_pd(lanes[r][k].as_ptr().add(half * HALF)) };
+                        *sums = unsafe { _mm256_loadu_pd(lanes[r][k].as_ptr().add(half * HALF)) };
                     }
                 }
             }
@@ -442,28 +441,35 @@ mod tests {
         (0..N).map(|i| ((i * 7 + k * 13) as f64).sin()).collect()
     }
 
+    fn slices(y: &mut Columns) -> [&mut [f64]; K] {
+        y.each_mut().map(Vec::as_mut_slice)
+    }
+
+    type Sums = [[f64; R]; K];
+    type Columns = [Vec<f64>; K];
+
     /// Row sums and y of the plain form and of every vector form the processor has.
-    fn all_forms<T: Entry>(rows: [&[T]; R], columns: Range<usize>) -> Vec<([[f64; R]; K], [Vec<f64>; K])> {
+    fn all_forms<T: Entry>(rows: [&[T]; R], columns: Range<usize>) -> Vec<(Sums, Columns)> {
         let skip = columns.start;
         let entries = rows.map(|row| &row[columns.clone()]);
-        let strip = Strip { entries, skip, ahead: Ahead { near: 64, far: 128, joined: skip % 2 == 0 } };
+        let strip =
+            Strip { entries, skip, ahead: Ahead { near: 64, far: 128, joined: skip.is_multiple_of(2) } };
         let x = [wave(5), wave(6), wave(7)];
         let x = x.each_ref().map(Vec::as_slice);
         let x_rows = [[0.3, -1.7, 2.9, 1.1], [0.7, -0.2, -0.4, 0.6], [1.3, 2.1, -0.8, 0.5]];
         let x_rows = x_rows.each_ref().map(|x| x.as_slice());
-        let run = |form: &dyn Fn([&mut [f64]; K]) -> [[f64; R]; K]| {
+        let run = |form: &dyn Fn(&mut Columns) -> Sums| {
             let mut y = [wave(8), wave(9), wave(10)];
-            let sums = form(y.each_mut().map(Vec::as_mut_slice));
-            (sums, y)
+            (form(&mut y), y)
         };
-        let mut found = vec![run(&|y| strip.add_plain(x_rows, x, y))];
+        let mut found = vec![run(&|y| strip.add_plain(x_rows, x, slices(y)))];
         if has_avx2() {
             // SAFETY: AVX2 and FMA are there, and all slices hold 40 values.
-            found.push(run(&|y| unsafe { strip.add_avx2(x_rows, x, y) }));
+            found.push(run(&|y| unsafe { strip.add_avx2(x_rows, x, slices(y)) }));
         }
         if std::arch::is_x86_feature_detected!("avx512f") {
             // SAFETY: AVX-512F is there, and all slices hold 40 values.
-            found.push(run(&|y| unsafe { strip.add_avx512(x_rows, x, y) }));
+            found.push(run(&|y| unsafe { strip.add_avx512(x_rows, x, slices(y)) }));
         }
         found
     }
