@@ -198,7 +198,7 @@ def write_matrix(path, mesh, exchange, row_errors=None, tolerance=0.0, tool="num
     """A symmetric matrix S = diag(A) F of a mesh that `read` gave, in blocks of `size` rows; blocks of zeros are left out."""
     n = mesh.record["elements"]
     areas = np.linalg.norm(vector_areas(polygons(mesh)), axis=1)
-    values, listed, offset = [], [], 0
+    values, listed, offset, sums = [], [], 0, np.zeros(n)
     for a in range(0, n, size):
         for b in range(a, n, size):
             part = exchange[a:a + size, b:b + size]
@@ -209,9 +209,12 @@ def write_matrix(path, mesh, exchange, row_errors=None, tolerance=0.0, tool="num
             listed.append((a, part.shape[0], b, part.shape[1], TRIANGLE if a == b else DENSE, 0, offset))
             values.append(stored)
             offset += len(stored)
+            sums[a:a + size] += part.sum(axis=1)
+            if a != b:
+                sums[b:b + size] += part.sum(axis=0)
     sections = {"areas": areas, "values": np.concatenate(values) if values else np.zeros(0),
                 "blocks": np.array(listed, BLOCK), "row_errors": np.zeros(n) if row_errors is None else row_errors,
-                "sparse": np.zeros(0, "<u4")}
+                "sparse": np.zeros(0, "<u4"), "row_sums": sums / areas}
     sections = {name: np.ascontiguousarray(a, F8) if a.dtype.kind == "f" else a for name, a in sections.items()}
     record = struct.pack("<I32sI??dII", n, bytes.fromhex(mesh.digest), 1, True, False, tolerance, 0, 1)
     _write(path, b"FFM", record, sections, tool, flags, {"mesh": mesh.digest})

@@ -1,4 +1,5 @@
-//! `formfactor-tool info`: what a matrix file holds, for people and as JSON.
+//! `formfactor-tool info`: what a matrix file holds, for people and as JSON. Entries are read only where they are to be
+//! verified: the page of a file larger than memory is there at once.
 
 use crate::reuse::source::{REUSED_MATRIX, REUSED_MESH};
 use interchange::error::Result;
@@ -8,12 +9,17 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
 
+/// Said of what was only glanced at.
+pub(crate) const UNVERIFIED: &str = "header, blocks and rows; not the entries, which --verify reads";
+
 /// Describes the matrix in one file, in all its parts, or one part alone; with the counters of the report beside the
-/// file, where there is one.
-pub fn describe(paths: &[impl AsRef<Path>], as_json: bool) -> Result<String> {
-    let matrix = match paths {
-        [path] => Matrix::open_part(path.as_ref())?,
-        all => Matrix::open_all(all)?,
+/// file, where there is one. With `verify` all of it is read and checked.
+pub fn describe(paths: &[impl AsRef<Path>], as_json: bool, verify: bool) -> Result<String> {
+    let matrix = match (paths, verify) {
+        ([path], true) => Matrix::open_part(path.as_ref())?,
+        ([path], false) => Matrix::glance_part(path.as_ref())?,
+        (all, true) => Matrix::open_all(all)?,
+        (all, false) => Matrix::glance_all(all)?,
     };
     let (path, files) = (matrix.path(), paths.len());
     let record = matrix.record();
@@ -22,16 +28,17 @@ pub fn describe(paths: &[impl AsRef<Path>], as_json: bool) -> Result<String> {
     // The half that is stored: the upper triangle with the diagonal.
     let half = elements as u64 * (elements as u64 + 1) / 2;
     let absent_share = 1.0 - stored as f64 / half as f64;
-    let sums = matrix.row_sums()?;
-    let row_sums = Spread::of(&sums);
+    let sums = if verify { Some(matrix.check_row_sums()?) } else { matrix.stated_row_sums()? };
+    let row_sums = sums.as_deref().map(Spread::of);
     let row_errors = Spread::of(matrix.row_errors()?);
     let precision = record.precision.name();
     let views = matrix.views()?;
     let sparse = views.iter().filter(|view| view.block.kind() == Ok(BlockKind::Sparse)).count();
     let part = record.parts != 1 && files == 1;
-    let defect = (1.0 - row_sums.least).max(row_sums.largest - 1.0);
+    let defect = row_sums.as_ref().map(|sums| (1.0 - sums.least).max(sums.largest - 1.0));
     // A row sum within its own estimated error of 1 loses nothing that could be told from error.
-    let closed = sums.iter().zip(matrix.row_errors()?).all(|(sum, error)| (1.0 - sum).abs() <= *error);
+    let errors = matrix.row_errors()?;
+    let closed = sums.map(|sums| sums.iter().zip(errors).all(|(sum, error)| (1.0 - sum).abs() <= *error));
     let provenance = matrix.provenance();
     let inputs: serde_json::Map<String, Value> =
         provenance.inputs.iter().map(|i| (i.role.clone(), json!(i.digest.to_string()))).collect();
@@ -54,9 +61,10 @@ pub fn describe(paths: &[impl AsRef<Path>], as_json: bool) -> Result<String> {
             "parts": record.parts,
             "tolerance": record.tolerance,
             "row_errors": row_errors.json(),
-            "row_sums": row_sums.json(),
+            "row_sums": row_sums.map(|sums| sums.json()),
             "largest_row_sum_defect": defect,
-            "closed": closed && !part,
+            "closed": closed.map(|closed| closed && !part),
+            "verified": matrix.is_verified(),
             "mesh": record.mesh.to_string(),
             "tool": provenance.tool,
             "version": provenance.version,
@@ -92,14 +100,18 @@ pub fn describe(paths: &[impl AsRef<Path>], as_json: bool) -> Result<String> {
     }
     line("tolerance", format!("{:e} asked per row", record.tolerance));
     line("row errors", row_errors.text());
-    line("row sums", row_sums.text());
-    let scene = match closed {
-        true => "closed: every row sum is 1 within its error".to_owned(),
-        false => format!("open, or inexact: row sums differ from 1 by up to {defect:.3e}"),
-    };
-    if !part {
+    match &row_sums {
+        Some(sums) => line("row sums", sums.text()),
+        None => line("row sums", "not in the file; --verify adds them up".to_owned()),
+    }
+    if let (Some(closed), Some(defect), false) = (closed, defect, part) {
+        let scene = match closed {
+            true => "closed: every row sum is 1 within its error".to_owned(),
+            false => format!("open, or inexact: row sums differ from 1 by up to {defect:.3e}"),
+        };
         line("scene", scene);
     }
+    line("verified", if matrix.is_verified() { "all of it" } else { UNVERIFIED }.to_owned());
     if let Some(counters) = report.as_ref().and_then(|r| r["counters"].as_object()) {
         counters.iter().for_each(|(name, count)| line("", format!("{name}: {count}")));
     }

@@ -1,9 +1,11 @@
 //! `formfactor-tool info --row`, `--pair` and `--group`: the factors themselves, read where they lie in the file, with
-//! the error that the file states and the flags that made them.
+//! the error that the file states and the flags that made them. Only the blocks that hold them are read, unless all is to be
+//! verified.
 //!
 //! A file states one error per row: the sum over j of |error of F_ij|. It bounds the error of every factor of that row, and
 //! the area's mean of it that of a group's factors.
 
+use crate::info::UNVERIFIED;
 use anyhow::bail;
 use interchange::error::{Error, Result, nearest_name};
 use interchange::grouping::{By, Grouping};
@@ -34,7 +36,7 @@ struct Place {
     mesh: Option<Mesh>,
 }
 
-/// Tells what was asked for, for people or as JSON.
+/// Tells what was asked for, for people or as JSON. With `verify` the whole matrix is read and checked before.
 ///
 /// # Errors
 /// A file cannot be read, or there is no such element or group.
@@ -43,8 +45,9 @@ pub fn describe(
     mesh: Option<&Path>,
     look: &Look,
     as_json: bool,
+    verify: bool,
 ) -> anyhow::Result<String> {
-    let matrix = Matrix::open_all(paths)?;
+    let matrix = if verify { Matrix::open_all(paths)? } else { Matrix::glance_all(paths)? };
     let mesh = match mesh {
         None => None,
         Some(path) => {
@@ -81,6 +84,10 @@ impl Place {
         format!("{group}, face {}", mesh.element_input(element) + 1)
     }
 
+    fn verified(&self) -> String {
+        if self.matrix.is_verified() { "all of it" } else { UNVERIFIED }.to_owned()
+    }
+
     fn made_by(&self) -> String {
         let origin = self.matrix.provenance();
         format!("{} {} {}", origin.tool, origin.version, origin.flags.join(" "))
@@ -97,7 +104,7 @@ impl Place {
             let factors: Vec<Value> = row.iter().map(|e| json!([e.column + 1, factor(e)])).collect();
             let data = json!({
                 "kind": "row", "element": element, "place": self.name(i), "area": area, "row_sum": sum, "row_error": error,
-                "made_by": self.made_by(), "factors": factors,
+                "made_by": self.made_by(), "verified": self.matrix.is_verified(), "factors": factors,
             });
             return Ok(format!("{data:#}\n"));
         }
@@ -126,6 +133,7 @@ impl Place {
             text.line("", format!("and {} more; --json lists all", row.len() - SHOWN));
         }
         text.line("made by", self.made_by());
+        text.line("verified", self.verified());
         Ok(text.0)
     }
 
@@ -153,6 +161,7 @@ impl Place {
             let data = json!({
                 "kind": "pair", "first": side(first, i, forth), "second": side(second, j, back),
                 "exchange": forth.map_or(0.0, |e| e.value), "stored": stored, "made_by": self.made_by(),
+                "verified": self.matrix.is_verified(),
             });
             return Ok(format!("{data:#}\n"));
         }
@@ -170,6 +179,7 @@ impl Place {
         text.line("exchange", format!("S = {:.12e}", forth.map_or(0.0, |e| e.value)));
         text.line("stored", stored);
         text.line("made by", self.made_by());
+        text.line("verified", self.verified());
         Ok(text.0)
     }
 
@@ -210,7 +220,7 @@ impl Place {
             let side = |name: &str, (area, factor, error, elements): &(f64, f64, f64, usize)| json!({ "group": name, "elements": elements, "area": area, "factor": factor, "error": error });
             let data = json!({
                 "kind": "groups", "first": side(first, &sides[0]), "second": side(second, &sides[1]),
-                "made_by": self.made_by(),
+                "made_by": self.made_by(), "verified": self.matrix.is_verified(),
             });
             return Ok(format!("{data:#}\n"));
         }
@@ -222,6 +232,7 @@ impl Place {
             text.line("", format!("F({from} -> {to}) = {factor:.12e}, error at most {error:.3e}"));
         }
         text.line("made by", self.made_by());
+        text.line("verified", self.verified());
         Ok(text.0)
     }
 }

@@ -18,6 +18,7 @@ const EXAMPLES: [&str; 8] = [
     "formfactor-tool compute box.mesh -o box.ff --tolerance 1e-3",
     "formfactor-tool compute finer.mesh -o finer.ff --tolerance 1e-3 --reuse box.ff --reuse-mesh box.mesh",
     "formfactor-tool info box.ff",
+    "formfactor-tool info box.ff --verify",
     "formfactor-tool info box.ff --group floor light --mesh box.mesh",
     "formfactor-tool export box.ff --mesh box.mesh --by group -o factors.csv",
     "formfactor-tool import factors.npz --mesh box.mesh -o again.ff --tolerance 1e-3",
@@ -150,6 +151,9 @@ enum Command {
         json: bool,
         #[command(flatten)]
         look: LookFlags,
+        /// Read all of the file and check it; without, the entries are only mapped
+        #[arg(long)]
+        verify: bool,
         /// Mesh of the matrix, to name faces and groups
         #[arg(long, value_name = "FILE")]
         mesh: Option<PathBuf>,
@@ -209,9 +213,9 @@ fn run(cli: Cli) -> anyhow::Result<Finish> {
             difference.check(max)?;
         }
         Command::Pages { prefix } => pages::write(Cli::command(), &prefix)?,
-        Command::Info { file, json, look, mesh } => print_data(&match look.look() {
-            Some(look) => look::describe(&file, mesh.as_deref(), &look, json)?,
-            None => info::describe(&file, json)?,
+        Command::Info { file, json, look, verify, mesh } => print_data(&match look.look() {
+            Some(look) => look::describe(&file, mesh.as_deref(), &look, json, verify)?,
+            None => info::describe(&file, json, verify)?,
         })?,
     }
     Ok(Finish::Done)

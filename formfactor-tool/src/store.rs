@@ -223,7 +223,8 @@ impl Store {
     /// # Errors
     /// The file cannot be written.
     pub fn finish(self) -> interchange::Result<Outcome> {
-        self.writer.finish(&self.row_errors)
+        let row_sums = self.row_sums();
+        self.writer.finish(&self.row_errors, &row_sums)
     }
 }
 

@@ -127,12 +127,12 @@ fn a_foreign_mesh_and_an_unknown_ending_are_refused() {
 #[test]
 fn info_shows_size_row_sums_and_errors() {
     let room = Room::new([0.5; 3], 1e-9);
-    let words = info::describe(&[&room.matrix], false).unwrap();
+    let words = info::describe(&[&room.matrix], false, true).unwrap();
     for part in ["elements     6", "21 entries (f64) in 3 blocks", "closed", "1e-4 asked", "1.000000e-9"] {
         assert!(words.contains(part), "{part}:\n{words}");
     }
     let json: serde_json::Value =
-        serde_json::from_str(&info::describe(&[&room.matrix], true).unwrap()).unwrap();
+        serde_json::from_str(&info::describe(&[&room.matrix], true, true).unwrap()).unwrap();
     assert_eq!((json["elements"].as_u64(), json["blocks"].as_u64()), (Some(6), Some(3)));
     assert_eq!(json["stored_entries"], 21);
     assert_eq!(json["absent_share"], 0.0);

@@ -1,6 +1,7 @@
 //! The one container all files share (`FORMAT.md`, "Envelope"): a 32-byte envelope, a small bincode header with
 //! provenance and the kind's own record, then 64-byte-aligned little-endian sections that are used where they are
-//! mapped. Envelope, header and every section carry checks; all are verified before a number is handed out.
+//! mapped. Envelope, header and every section carry checks; all are verified before a number is handed out, but for
+//! sections that a caller of [`File::glance`] names.
 
 mod stream;
 
@@ -165,7 +166,7 @@ fn checksum_into(whole: &mut crc32fast::Hasher, bytes: &[u8]) {
     pieces.iter().for_each(|piece| whole.combine(piece));
 }
 
-/// A mapped file whose envelope, header and section checksums have been verified.
+/// A mapped file whose envelope, header and section checksums have been verified, but for sections it was only glanced at.
 #[derive(Debug)]
 pub struct File<R> {
     path: PathBuf,
@@ -184,6 +185,12 @@ impl<R: DeserializeOwned> File<R> {
     /// Checked in this order: magic, version, header length, header checksum, header encoding, section bounds, section
     /// overlap, file length, section checksums.
     pub fn open(path: &Path, kind: Kind) -> Result<Self> {
+        Self::glance(path, kind, &[])
+    }
+
+    /// [`File::open`], but nothing of the sections named in `unread` is read: neither their checksum is verified nor their
+    /// content. For looking at files larger than memory; nothing may be computed with what is in those sections.
+    pub fn glance(path: &Path, kind: Kind, unread: &[&str]) -> Result<Self> {
         let bytes = mapping::map(path)?;
         let remake = format!("remake it with {}", kind.describe().1);
         let header_end = check_envelope(path, &bytes, kind, &remake)?;
@@ -195,7 +202,7 @@ impl<R: DeserializeOwned> File<R> {
         if used != encoded.len() {
             return Err(damaged(format!("{} bytes left over", encoded.len() - used)));
         }
-        check_sections(path, &bytes, header_end, &header.sections, &remake)?;
+        check_sections(path, &bytes, header_end, &header.sections, unread, &remake)?;
         let digest = Digest::of(&bytes[..header_end]);
         let (provenance, record) = (header.provenance, header.record);
         Ok(Self { path: path.to_owned(), bytes, digest, sections: header.sections, provenance, record })
@@ -303,6 +310,7 @@ fn check_sections(
     bytes: &[u8],
     header_end: usize,
     sections: &[Section],
+    unread: &[&str],
     remake: &str,
 ) -> Result<()> {
     let mut end = header_end as u64;
@@ -322,6 +330,9 @@ fn check_sections(
         })?;
         if bytes[padding_start as usize..section.offset as usize].iter().any(|&b| b != 0) {
             return Err(wrong("bytes other than zero in the padding before it".into(), "zeros"));
+        }
+        if unread.contains(&section.name.as_str()) {
+            continue;
         }
         let content = &bytes[section.offset as usize..end as usize];
         let found = checksum(content);
@@ -406,6 +417,22 @@ mod tests {
             std::fs::write(&bad, &flipped).unwrap();
             assert!(File::<u32>::open(&bad, Kind::Mesh).is_err(), "bit {bit}");
         }
+    }
+
+    #[test]
+    fn a_glance_leaves_out_only_what_it_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.mesh");
+        sample(&path);
+        let mut bytes = std::fs::read(&path).unwrap();
+        let start = bytes.windows(5).rposition(|window| window == b"hello").unwrap();
+        bytes[start] ^= 1;
+        std::fs::write(&path, &bytes).unwrap();
+        assert!(File::<u32>::glance(&path, Kind::Mesh, &["numbers"]).is_err());
+        let file = File::<u32>::glance(&path, Kind::Mesh, &["bytes"]).unwrap();
+        assert_eq!(file.section::<f64>("numbers").unwrap(), [1.0, 2.0, 3.0]);
+        std::fs::write(&path, &bytes[..bytes.len() - 1]).unwrap();
+        assert!(File::<u32>::glance(&path, Kind::Mesh, &["bytes"]).is_err());
     }
 
     #[test]

@@ -46,6 +46,9 @@ pub struct MatrixRecord {
     pub parts: u32,
 }
 
+/// Sections that grow with the number of entries.
+const ENTRY_SECTIONS: [&str; 2] = ["values", "sparse"];
+
 /// One mapped file.
 type PartFile = File<MatrixRecord>;
 
@@ -73,6 +76,14 @@ impl PartFile {
     fn row_errors(&self) -> Result<&[f64]> {
         self.counted_section("row_errors", self.record.elements as usize)
     }
+
+    /// Row sums of F as the writer found them; `None` where it left them out.
+    fn row_sums(&self) -> Result<Option<&[f64]>> {
+        if !self.has("row_sums") {
+            return Ok(None);
+        }
+        self.counted_section("row_sums", self.record.elements as usize).map(Some)
+    }
 }
 
 /// A mapped matrix: one file, or all parts of one.
@@ -82,6 +93,8 @@ pub struct Matrix {
     files: Vec<PartFile>,
     /// Sums over the files.
     row_errors: Vec<f64>,
+    /// Whether the entries were verified when the files were opened.
+    verified: bool,
 }
 
 impl Matrix {
@@ -94,9 +107,26 @@ impl Matrix {
     /// whole.
     pub fn open_part(path: &Path) -> Result<Self> {
         let file = File::open(path, Kind::Matrix)?;
-        check::file(&file)?;
+        check::all_but_entries(&file)?;
+        check::entries(&file)?;
         let row_errors = file.row_errors()?.to_vec();
-        Ok(Self { files: vec![file], row_errors })
+        Ok(Self { files: vec![file], row_errors, verified: true })
+    }
+
+    /// [`Matrix::open_part`] without a look at the entries, however large the file is: header, blocks, areas, row errors
+    /// and row sums are checked, the entries and the structure of sparse blocks are only mapped. To be described, never to
+    /// be computed with: only [`Matrix::row`] may be asked for entries, which checks what it reads as far as it can be
+    /// told from the entries themselves.
+    pub fn glance_part(path: &Path) -> Result<Self> {
+        let file = File::glance(path, Kind::Matrix, &ENTRY_SECTIONS)?;
+        check::all_but_entries(&file)?;
+        let row_errors = file.row_errors()?.to_vec();
+        Ok(Self { files: vec![file], row_errors, verified: false })
+    }
+
+    /// Whether the checksums of the entries were verified.
+    pub fn is_verified(&self) -> bool {
+        self.verified
     }
 
     /// Refuses a matrix that was not computed for the mesh with this digest.
@@ -175,6 +205,37 @@ impl Matrix {
     /// Estimated sum over j of |error of F_ij|, per row i.
     pub fn row_errors(&self) -> Result<&[f64]> {
         Ok(&self.row_errors)
+    }
+
+    /// Row sums of F as the files state them, those of all parts added up; `None` where one leaves them out.
+    pub fn stated_row_sums(&self) -> Result<Option<Vec<f64>>> {
+        let mut sums = vec![0.0; self.element_count()];
+        for file in &self.files {
+            let Some(part) = file.row_sums()? else { return Ok(None) };
+            sums.iter_mut().zip(part).for_each(|(sum, part)| *sum += part);
+        }
+        Ok(Some(sums))
+    }
+
+    /// Refuses row sums that are not those of the entries, which must have been verified. Returns those of the entries.
+    pub fn check_row_sums(&self) -> Result<Vec<f64>> {
+        let sums = self.row_sums()?;
+        let stated = self.stated_row_sums()?;
+        // Sums of n terms of one sign in two orders differ by less than n epsilon of themselves each, parts and the
+        // division by the area by some more.
+        let tolerance = (2 * self.element_count() + 8) as f64 * f64::EPSILON;
+        let wrong = |(found, sum): (&f64, &f64)| (found - sum).abs() > tolerance * sum.abs();
+        if let Some(stated) = stated
+            && let Some(i) = stated.iter().zip(&sums).position(wrong)
+        {
+            let found = format!("{:e} at {i}", stated[i]);
+            return Err(self.files[0].damaged(
+                "row_sums",
+                found,
+                format!("{:e}, as the entries say", sums[i]),
+            ));
+        }
+        Ok(sums)
     }
 
     /// Calls `visit(i, j, S_ij)` for every stored entry: each pair once with i <= j where the matrix is symmetric.

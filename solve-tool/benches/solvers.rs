@@ -17,12 +17,18 @@ fn main() {
     let cube = Scene::cube_grid(8);
     let lit_cube: Vec<f64> =
         (0..384).map(|i| if [27, 28, 35, 36].map(|k| 320 + k).contains(&i) { 1.0 } else { 0.0 }).collect();
-    let rooms = Scene::two_rooms(8);
-    let lit_rooms: Vec<f64> = (0..rooms.len()).map(|i| if i < 4 { 1.0 } else { 0.0 }).collect();
+    let (rooms, open_rooms) = (Scene::two_rooms(8, 1), Scene::two_rooms(8, 3));
+    let four_lit =
+        |scene: &Scene| (0..scene.len()).map(|i| if i < 4 { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
+    let (lit_rooms, lit_open_rooms) = (four_lit(&rooms), four_lit(&open_rooms));
     println!(
         "tolerance {TOLERANCE:e}, at most {MOST_STEPS} steps; error and bound relative to the emitted power"
     );
-    for (name, scene, e) in [("cube", &cube, &lit_cube), ("two rooms with a door", &rooms, &lit_rooms)] {
+    for (name, scene, e) in [
+        ("cube", &cube, &lit_cube),
+        ("two rooms, a 64th of the wall between them open", &rooms, &lit_rooms),
+        ("two rooms, a seventh of the wall between them open", &open_rooms, &lit_open_rooms),
+    ] {
         println!("\n{name}, {} elements", scene.len());
         println!("rho     method              products  seconds   true error  bound     end");
         for rho in [0.2, 0.5, 0.8, 0.9, 0.99, 0.999] {

@@ -4,20 +4,31 @@
 //! right-hand sides at once, so that an entry is read from memory once for everything it is good for. Entries are
 //! f32 or f64, products and sums f64: with f32 sums the closure of a row of 1e5 entries drifts by 1e-4.
 //!
-//! The order of every sum is fixed by [`LANES`] and [`ROWS`] alone and every multiply-add of a chunk is fused, in the
-//! vector forms ([`lanes`]) as in the plain one, so the result has the same bits on every machine. Half of all
+//! The order of every sum is fixed by [`LANES`], [`ROWS`] and [`TILE`] alone and every multiply-add of a strip is fused,
+//! in the vector forms ([`lanes`]) as in the plain one, so the result has the same bits on every machine. Half of all
 //! arithmetic is saved by that; a processor without fused multiply-add (before 2013) gets the same numbers slowly.
 
 mod lanes;
 
 use interchange::matrix::BlockView;
-pub(crate) use lanes::Entry;
-use lanes::{LANES, chunks};
+use lanes::{Ahead, Strip};
+pub(crate) use lanes::{Entry, LANES};
 use std::ops::Range;
 
 /// Rows handled together: x_j and y_j are loaded once for all of them. Four rows of three vectors fill the 32 registers
 /// of AVX-512.
 pub(crate) const ROWS: usize = 4;
+
+/// Columns of a wider block that are taken for all its rows before the next ones are: x and y of three vectors over so
+/// many columns are 12 KB and stay in the first-level cache. A multiple of [`ROWS`].
+const TILE: usize = 256;
+
+/// Strips that memory is asked for ahead: 4 rows of 256 columns are 4 KB or 8 KB, and 16 KB are about what a core reads in
+/// the time memory takes to answer.
+const STRIPS_AHEAD: usize = 4;
+/// Least bytes ahead, where strips are short.
+const NEAR_BYTES: usize = 2048;
+const FAR_BYTES: usize = 4096;
 
 /// Rows of one block that are consecutive in memory.
 #[derive(Debug, Clone, Copy)]
@@ -47,23 +58,29 @@ impl Rows {
     }
 }
 
-/// Adds what `rows` contribute to S x; `y[k][i - base]` stands for row i of result k.
+/// Adds what `rows` contribute to S x; `y[k][i - base]` stands for row i of result k. `base` is a multiple of [`LANES`],
+/// and x and y hold whole chunks.
 pub(crate) fn add_rows<const K: usize, T: Entry>(
     rows: &Rows,
     values: &[T],
     x: [&[f64]; K],
-    y: &mut [Vec<f64>; K],
+    y: &mut [&mut [f64]; K],
     base: usize,
 ) {
     let end = rows.first + rows.count;
-    let mut row = rows.first;
-    while row + ROWS <= end {
-        add_strip::<ROWS, K, T>(rows, row, values, x, y, base);
-        row += ROWS;
-    }
-    while row < end {
-        add_strip::<1, K, T>(rows, row, values, x, y, base);
-        row += 1;
+    // A triangle's rows hold nothing to the left of the diagonal.
+    let first_tile = if rows.triangle { rows.first / TILE * TILE } else { 0 };
+    for start in (first_tile..rows.columns).step_by(TILE) {
+        let tile = start..(start + TILE).min(rows.columns);
+        let mut row = rows.first;
+        while row + ROWS <= end {
+            add_strip::<ROWS, K, T>(rows, row, tile.clone(), values, x, y, base);
+            row += ROWS;
+        }
+        while row < end {
+            add_strip::<1, K, T>(rows, row, tile.clone(), values, x, y, base);
+            row += 1;
+        }
     }
 }
 
@@ -73,7 +90,7 @@ pub(crate) fn add_sparse_rows<const K: usize, T: Entry>(
     rows: Range<usize>,
     values: &[T],
     x: [&[f64]; K],
-    y: &mut [Vec<f64>; K],
+    y: &mut [&mut [f64]; K],
     base: usize,
 ) {
     let column_start = view.block.column_start as usize;
@@ -96,75 +113,62 @@ pub(crate) fn add_sparse_rows<const K: usize, T: Entry>(
     }
 }
 
-/// R consecutive rows from row `first` of the block.
+/// R consecutive rows from row `first` of the block, as far as they lie in the columns of `tile`.
 #[inline(always)]
 fn add_strip<const R: usize, const K: usize, T: Entry>(
     rows: &Rows,
     first: usize,
+    tile: Range<usize>,
     values: &[T],
     x: [&[f64]; K],
-    y: &mut [Vec<f64>; K],
+    y: &mut [&mut [f64]; K],
     base: usize,
 ) {
     let i = rows.row_start + first;
-    let x_rows: [[f64; K]; R] = std::array::from_fn(|r| std::array::from_fn(|k| x[k][i + r]));
+    let x_rows = x.map(|x| &x[i..][..R]);
 
     // Between the R rows of a triangle lies a small triangle, taken entry by entry; to the right of it all rows of
-    // the strip have the same columns.
-    let mut skipped = 0;
+    // the strip have the same columns. It lies in one tile, as strips begin at multiples of their height.
+    let mut start = tile.start;
     if rows.triangle {
-        skipped = first + R;
-        for r in 0..R {
-            for (c, &s) in values[rows.start(first + r)..][..R - r].iter().enumerate() {
-                let s: f64 = s.into();
-                for k in 0..K {
-                    y[k][i + r - base] += s * x_rows[r + c][k];
-                    if c > 0 {
-                        y[k][i + r + c - base] += s * x_rows[r][k];
+        if tile.contains(&first) {
+            for r in 0..R {
+                for (c, &s) in values[rows.start(first + r)..][..R - r].iter().enumerate() {
+                    let s: f64 = s.into();
+                    for k in 0..K {
+                        y[k][i + r - base] += s * x_rows[k][r + c];
+                        if c > 0 {
+                            y[k][i + r + c - base] += s * x_rows[k][r];
+                        }
                     }
                 }
             }
         }
+        start = start.max(first + R);
+    }
+    if start >= tile.end {
+        return;
     }
 
-    let columns = rows.columns - skipped;
+    let columns = tile.end - start;
     let entries: [&[T]; R] = std::array::from_fn(|r| {
-        let already = if rows.triangle { R - r } else { 0 };
-        &values[rows.start(first + r) + already..][..columns]
+        let before = if rows.triangle { start - first - r } else { start };
+        &values[rows.start(first + r) + before..][..columns]
     });
-    let j = rows.column_start + skipped;
-    let x_columns = x.map(|x| &x[j..][..columns]);
-    let y_columns = y.each_mut().map(|y| &mut y[j - base..][..columns]);
-    let sums = rectangle(entries, &x_rows, x_columns, y_columns);
-    for (r, sums) in sums.iter().enumerate() {
-        for k in 0..K {
-            y[k][i + r - base] += sums[k];
-        }
+    let bytes = (rows.start(first + R) - rows.start(first)) * size_of::<T>();
+    let joined = rows.columns <= TILE;
+    let ahead = Ahead {
+        near: if joined { bytes.max(NEAR_BYTES) } else { bytes },
+        far: (STRIPS_AHEAD * bytes).max(FAR_BYTES),
+        joined,
+    };
+    let j = rows.column_start + start;
+    let (chunk, skip) = (j / LANES * LANES, j % LANES);
+    let padded = (skip + columns).next_multiple_of(LANES);
+    let x_columns = x.map(|x| &x[chunk..][..padded]);
+    let y_columns = y.each_mut().map(|y| &mut y[chunk - base..][..padded]);
+    let sums = Strip { entries, skip, ahead }.add(x_rows, x_columns, y_columns);
+    for k in 0..K {
+        y[k][i - base..][..R].iter_mut().zip(sums[k]).for_each(|(y, sum)| *y += sum);
     }
-}
-
-/// Returns the R row sums of a rectangle and adds its mirror image to `y`. All slices have the same length.
-fn rectangle<const R: usize, const K: usize, T: Entry>(
-    entries: [&[T]; R],
-    x_rows: &[[f64; K]; R],
-    x: [&[f64]; K],
-    mut y: [&mut [f64]; K],
-) -> [[f64; K]; R] {
-    let whole = x[0].len() / LANES * LANES;
-    let partial = chunks(entries, x_rows, x, &mut y, whole);
-    let mut sums = [[0.0; K]; R];
-    for r in 0..R {
-        for k in 0..K {
-            // The last columns, fewer than a chunk.
-            let mut tail = 0.0;
-            for (column, &s) in entries[r].iter().enumerate().skip(whole) {
-                let s: f64 = s.into();
-                tail += s * x[k][column];
-                y[k][column] += s * x_rows[r][k];
-            }
-            let [a, b, c, d, e, f, g, h] = partial[r][k];
-            sums[r][k] = (((a + e) + (c + g)) + ((b + f) + (d + h))) + tail;
-        }
-    }
-    sums
 }

@@ -10,10 +10,10 @@ mod one_way;
 pub(crate) mod rows;
 mod scratch;
 
-use crate::kernel::{self, Entry, ROWS, Rows};
+use crate::kernel::{self, Entry, LANES, ROWS, Rows};
 use interchange::matrix::{Block, BlockKind, BlockView, Matrix, Values, views};
 use rayon::prelude::*;
-use scratch::Scratch;
+use scratch::{Buffer, Scratch};
 use std::ops::Range;
 
 /// Fewest entries worth a task: 2^16 are about 20 microseconds of work.
@@ -174,20 +174,23 @@ impl<'a> Product<'a> {
     }
 
     fn apply_some<const K: usize>(&self, x: [&[f64]; K]) -> [Vec<f64>; K] {
-        match self.symmetric {
-            true => self.sum_tasks(x, |task| self.run(task, x)),
-            false => self.sum_tasks(x, |task| self.run_one_way(task, x)),
+        if !self.symmetric {
+            return self.sum_tasks(x, |task| self.run_one_way(task, x));
         }
+        let aligned = x.map(|x| self.scratch.copy(x));
+        let y = self.sum_tasks(x, |task| self.run(task, aligned.each_ref().map(|x| &**x)));
+        self.scratch.give_back(aligned.into_iter());
+        y
     }
 
     /// Runs the tasks on all cores and adds what each found on its span, in the order of the tasks.
     fn sum_tasks<const K: usize>(
         &self,
         x: [&[f64]; K],
-        run: impl Fn(&Task) -> [Vec<f64>; K] + Sync + Send,
+        run: impl Fn(&Task) -> [Buffer; K] + Sync + Send,
     ) -> [Vec<f64>; K] {
         debug_assert!(x.iter().all(|x| x.len() == self.elements), "vectors of another length");
-        let partial: Vec<[Vec<f64>; K]> = self.tasks.par_iter().map(run).collect();
+        let partial: Vec<[Buffer; K]> = self.tasks.par_iter().map(run).collect();
         let y = std::array::from_fn(|k| {
             let mut y = vec![0.0; self.elements];
             y.par_chunks_mut(REDUCTION_ROWS).enumerate().for_each(|(chunk, y)| {
@@ -195,7 +198,7 @@ impl<'a> Product<'a> {
                 for (task, sums) in self.tasks.iter().zip(&partial) {
                     let (first, end) = (rows.start.max(task.span.start), rows.end.min(task.span.end));
                     for i in first..end {
-                        y[i - rows.start] += sums[k][i - task.span.start];
+                        y[i - rows.start] += sums[k][i - task.base()];
                     }
                 }
             });
@@ -205,16 +208,18 @@ impl<'a> Product<'a> {
         y
     }
 
-    fn run<const K: usize>(&self, task: &Task, x: [&[f64]; K]) -> [Vec<f64>; K] {
-        let mut y = std::array::from_fn(|_| self.scratch.zeros(task.span.len()));
+    /// What a task adds to S x, on its span. `x` holds whole chunks.
+    fn run<const K: usize>(&self, task: &Task, x: [&[f64]; K]) -> [Buffer; K] {
+        let mut buffers: [Buffer; K] = std::array::from_fn(|_| self.scratch.zeros(task.length()));
+        let mut y = buffers.each_mut().map(|y| &mut **y);
         for piece in &task.pieces {
             let view = &self.views[piece.block as usize];
             match view.values {
-                Values::F32(values) => run_piece(piece, view, values, x, &mut y, task.span.start),
-                Values::F64(values) => run_piece(piece, view, values, x, &mut y, task.span.start),
+                Values::F32(values) => run_piece(piece, view, values, x, &mut y, task.base()),
+                Values::F64(values) => run_piece(piece, view, values, x, &mut y, task.base()),
             }
         }
-        y
+        buffers
     }
 }
 
@@ -223,7 +228,7 @@ fn run_piece<const K: usize, T: Entry>(
     view: &BlockView<'_>,
     values: &[T],
     x: [&[f64]; K],
-    y: &mut [Vec<f64>; K],
+    y: &mut [&mut [f64]; K],
     base: usize,
 ) {
     let block = &view.block;
@@ -301,6 +306,16 @@ fn partition(views: &[BlockView<'_>], quota: u64) -> Vec<Task> {
 }
 
 impl Task {
+    /// Row of y where its copy begins: the chunk of the first it touches.
+    fn base(&self) -> usize {
+        self.span.start / LANES * LANES
+    }
+
+    /// Length of its copy of y.
+    fn length(&self) -> usize {
+        self.span.end - self.base()
+    }
+
     fn add(&mut self, index: usize, view: &BlockView<'_>, first: u32, end: u32) {
         let block = &view.block;
         let rows = block.row_start + first..block.row_start + end;

@@ -168,7 +168,7 @@ fn steps_are_as_known_or_fewer() {
 /// Each nearly closed room adds an eigenvalue near 1 - rho: conjugate gradients need a step or two more for it.
 #[test]
 fn two_rooms_joined_by_a_door_cost_a_few_steps_more() {
-    let scene = Scene::two_rooms(6);
+    let scene = Scene::two_rooms(6, 1);
     let n = scene.len();
     let e: Vec<f64> = (0..n).map(|i| if i < 4 { 1.0 } else { 0.0 }).collect();
     for (rho, known_in_one) in [(0.5, 8.0), (0.9, 10.0), (0.99, 11.0)] {

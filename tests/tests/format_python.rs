@@ -275,6 +275,7 @@ fn python_reads_sparse_blocks() {
     (shown[3], shown[17]) = (0.25, 0.5);
     let mut square = [0.0; 36];
     (square[1], square[20]) = (0.125, 0.75);
+    let mut sums = [0.0; 20];
     for (rows, columns, entries) in [
         (0..2, 0..2, &[0.0, 0.1, 0.0][..]),
         (2..6, 10..15, &shown),
@@ -282,16 +283,23 @@ fn python_reads_sparse_blocks() {
         (8..10, 18..20, &[0.2, 0.3, 0.4, 0.5]),
     ] {
         let triangle = rows == columns;
-        writer.push(&PackedBlock::new(rows, columns, triangle, entries, Precision::F64, true)).unwrap();
+        let packed = PackedBlock::new(rows, columns, triangle, entries, Precision::F64, true);
+        packed.view().for_each(|i, j, s| {
+            sums[i] += s / areas[i];
+            sums[j] += if i == j { 0.0 } else { s / areas[j] };
+        });
+        writer.push(&packed).unwrap();
     }
     let codes: Vec<u32> = writer.blocks().iter().map(|block| block.code).collect();
     assert_eq!(codes, [1, 2, 2, 0]);
-    writer.finish(&[0.0; 20]).unwrap();
+    writer.finish(&[0.0; 20], &sums).unwrap();
     let got = json(&reader(folder.path()), &path);
     assert_same_matrix(&got, &path);
     let text = tests::text(&tests::root().join("interchange/FORMAT.md"));
     assert!(text.contains("the 7 items `0 1 1 1 2` `3 2`"));
     assert_eq!(got["sections"]["sparse"].as_array().unwrap()[..7], [0, 1, 1, 1, 2, 3, 2].map(Value::from));
+    assert_numbers("stated row sums", &got["sections"]["row_sums"], sums.iter().copied());
+    Matrix::open(&path).unwrap().check_row_sums().unwrap();
     // S(2, 13) over A of either.
     assert_numbers("row sum 2", &got["row_sums"][2], [0.25 / 3.0]);
 }

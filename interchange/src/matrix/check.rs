@@ -1,15 +1,38 @@
 //! What a reader checks of a matrix file before it hands out a number (`FORMAT.md`, sections 5 and 7).
 
-use super::{Block, BlockKind, MatrixRecord, PartFile, Values, views};
+use super::{Block, BlockKind, BlockView, MatrixRecord, PartFile, Values, views};
 use crate::error::{Error, Result};
 
 const UPDATE: &str = "this program is older than the file: update it";
 
-/// Checks one file.
-pub(super) fn file(file: &PartFile) -> Result<()> {
+/// Checks one file but for its entries: what is of the size of the rows or the blocks.
+pub(super) fn all_but_entries(file: &PartFile) -> Result<()> {
     header(file)?;
     blocks(file)?;
-    numbers(file)
+    row_numbers(file)
+}
+
+/// Checks the entries of a file of which all else was checked.
+pub(super) fn entries(file: &PartFile) -> Result<()> {
+    for (i, view) in views(file.blocks()?, file.values()?, file.structure()?).enumerate() {
+        structure(file, i, &view)?;
+    }
+    let values = file.values()?;
+    let bad = match values {
+        Values::F32(v) => v.iter().position(|&x| !usable(x.into())),
+        Values::F64(v) => v.iter().position(|&x| !usable(x)),
+    };
+    bad.map_or(Ok(()), |at| Err(unusable(file, values.get(at), at as u64)))
+}
+
+/// Whether a number can be an entry, an error or a sum.
+pub(super) fn usable(x: f64) -> bool {
+    x.is_finite() && x >= 0.0
+}
+
+/// The error for entry `at` of the values.
+pub(super) fn unusable(file: &PartFile, value: f64, at: u64) -> Error {
+    file.damaged("values", format!("{value} at {at}"), "finite entries of at least 0")
 }
 
 fn header(file: &PartFile) -> Result<()> {
@@ -50,31 +73,34 @@ fn blocks(file: &PartFile) -> Result<()> {
         let found = format!("{} items", structure.len());
         return Err(file.damaged("sparse", found, format!("{items}, as the blocks say")));
     }
-    for (i, view) in views(file.blocks()?, values, structure).enumerate() {
-        if view.block.kind() != Ok(BlockKind::Sparse) {
-            continue;
-        }
-        // Starts from 0 to the number of entries, never falling; columns rising, within the block, not before the diagonal.
-        let wrong = |found: String, expected: &str| file.damaged(&format!("block {i}"), found, expected);
-        let (starts, columns) = view.structure.split_at(view.block.rows as usize + 1);
-        if starts[0] != 0 || starts.last() != Some(&view.block.rank) || !starts.is_sorted() {
+    Ok(())
+}
+
+/// Checks where block `i` of a file, where it is sparse, has its entries: starts from 0 to the number of entries, never
+/// falling; columns rising, within the block, not before the diagonal.
+pub(super) fn structure(file: &PartFile, i: usize, view: &BlockView<'_>) -> Result<()> {
+    if view.block.kind() != Ok(BlockKind::Sparse) {
+        return Ok(());
+    }
+    let wrong = |found: String, expected: &str| file.damaged(&format!("block {i}"), found, expected);
+    let (starts, columns) = view.structure.split_at(view.block.rows as usize + 1);
+    if starts[0] != 0 || starts.last() != Some(&view.block.rank) || !starts.is_sorted() {
+        return Err(wrong(
+            "row starts that fall or do not fit".into(),
+            "starts from 0 to the number of entries",
+        ));
+    }
+    for (row, ends) in starts.windows(2).enumerate() {
+        let columns = &columns[ends[0] as usize..ends[1] as usize];
+        let first = if view.block.is_diagonal() { row as u32 } else { 0 };
+        let fits = columns.first().is_none_or(|&c| c >= first)
+            && columns.last().is_none_or(|&c| c < view.block.columns)
+            && columns.windows(2).all(|pair| pair[0] < pair[1]);
+        if !fits {
             return Err(wrong(
-                "row starts that fall or do not fit".into(),
-                "starts from 0 to the number of entries",
+                format!("columns of row {row} out of place"),
+                "rising columns within the block",
             ));
-        }
-        for (row, ends) in starts.windows(2).enumerate() {
-            let columns = &columns[ends[0] as usize..ends[1] as usize];
-            let first = if view.block.is_diagonal() { row as u32 } else { 0 };
-            let fits = columns.first().is_none_or(|&c| c >= first)
-                && columns.last().is_none_or(|&c| c < view.block.columns)
-                && columns.windows(2).all(|pair| pair[0] < pair[1]);
-            if !fits {
-                return Err(wrong(
-                    format!("columns of row {row} out of place"),
-                    "rising columns within the block",
-                ));
-            }
         }
     }
     Ok(())
@@ -106,23 +132,17 @@ fn place(file: &PartFile, part: &str, block: &Block) -> Result<()> {
     Ok(())
 }
 
-fn numbers(file: &PartFile) -> Result<()> {
-    let usable = |x: f64| x.is_finite() && x >= 0.0;
-    let values = file.values()?;
-    let bad = match values {
-        Values::F32(v) => v.iter().position(|&x| !usable(x.into())),
-        Values::F64(v) => v.iter().position(|&x| !usable(x)),
-    };
-    if let Some(at) = bad {
-        let found = format!("{} at {at}", values.get(at));
-        return Err(file.damaged("values", found, "finite entries of at least 0"));
-    }
+fn row_numbers(file: &PartFile) -> Result<()> {
     let (areas, errors) = (file.areas()?, file.row_errors()?);
     if let Some(i) = areas.iter().position(|&a| !(a.is_finite() && a > 0.0)) {
         return Err(file.damaged("areas", format!("{} at {i}", areas[i]), "areas above 0"));
     }
     if let Some(i) = errors.iter().position(|&e| !usable(e)) {
         return Err(file.damaged("row_errors", format!("{} at {i}", errors[i]), "errors of at least 0"));
+    }
+    let sums = file.row_sums()?.unwrap_or_default();
+    if let Some(i) = sums.iter().position(|&sum| !usable(sum)) {
+        return Err(file.damaged("row_sums", format!("{} at {i}", sums[i]), "sums of at least 0"));
     }
     Ok(())
 }

@@ -13,9 +13,23 @@ impl Matrix {
     /// # Errors
     /// Besides damage: an incomplete set, a part given twice, parts of different runs; the file is named.
     pub fn open_all(paths: &[impl AsRef<Path>]) -> Result<Self> {
-        let mut files = Vec::with_capacity(paths.len());
+        Self::combine(paths, Self::open_part)
+    }
+
+    /// [`Matrix::open_all`] without a look at the entries, see [`Matrix::glance_part`].
+    ///
+    /// # Errors
+    /// As those of [`Matrix::open_all`].
+    pub fn glance_all(paths: &[impl AsRef<Path>]) -> Result<Self> {
+        Self::combine(paths, Self::glance_part)
+    }
+
+    fn combine(paths: &[impl AsRef<Path>], open: impl Fn(&Path) -> Result<Self>) -> Result<Self> {
+        let (mut files, mut verified) = (Vec::with_capacity(paths.len()), true);
         for path in paths {
-            files.extend(Self::open_part(path.as_ref())?.files);
+            let part = open(path.as_ref())?;
+            verified &= part.verified;
+            files.extend(part.files);
         }
         files.sort_by_key(|file| file.record.part);
         let Some(first) = files.first() else {
@@ -29,7 +43,7 @@ impl Matrix {
         for file in &files {
             row_errors.iter_mut().zip(file.row_errors()?).for_each(|(sum, error)| *sum += error);
         }
-        Ok(Self { files, row_errors })
+        Ok(Self { files, row_errors, verified })
     }
 }
 

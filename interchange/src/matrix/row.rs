@@ -1,6 +1,6 @@
 //! One row of a mapped matrix: the few blocks that touch it, and of those only what lies in it.
 
-use super::{BlockKind, BlockView, Matrix, views};
+use super::{Block, BlockKind, BlockView, Matrix, check, views};
 use crate::error::Result;
 
 /// An entry and the block it stands in.
@@ -15,17 +15,35 @@ pub struct RowEntry {
 }
 
 impl Matrix {
-    /// Entries of row `i` of S that some block stores (zeros of dense blocks included), columns rising.
+    /// Entries of row `i` of S that some block stores (zeros of dense blocks included), columns rising. Of a matrix that was
+    /// only glanced at, the blocks that are read are checked, but for their checksum.
     pub fn row(&self, i: usize) -> Result<Vec<RowEntry>> {
-        let mut row = Vec::new();
+        let (mut row, mirrored) = (Vec::new(), self.record().symmetric);
         for file in &self.files {
-            for view in views(file.blocks()?, file.values()?, file.structure()?) {
-                view.entries_of(i, self.record().symmetric, &mut row);
+            for (index, view) in views(file.blocks()?, file.values()?, file.structure()?).enumerate() {
+                if !touches(&view.block, i, mirrored) {
+                    continue;
+                }
+                let before = row.len();
+                if !self.verified {
+                    check::structure(file, index, &view)?;
+                }
+                view.entries_of(i, mirrored, &mut row);
+                let bad = |entry: &&RowEntry| !check::usable(entry.value);
+                if let Some(entry) = row[before..].iter().find(bad) {
+                    return Err(check::unusable(file, entry.value, view.block.offset));
+                }
             }
         }
         row.sort_by_key(|entry| entry.column);
         Ok(row)
     }
+}
+
+/// Whether a block says anything of row `i`; with `mirrored`, its columns are rows, too.
+fn touches(block: &Block, i: usize, mirrored: bool) -> bool {
+    let within = |start: u32, count: u32| (start as usize..start as usize + count as usize).contains(&i);
+    within(block.row_start, block.rows) || (mirrored && within(block.column_start, block.columns))
 }
 
 impl BlockView<'_> {

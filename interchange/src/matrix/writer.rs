@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use tempfile::SpooledTempFile;
 
 /// Sections in the order in which they are written: what is known only at the end comes last.
-const SECTIONS: [&str; 5] = ["areas", "values", "blocks", "row_errors", "sparse"];
+const SECTIONS: [&str; 6] = ["areas", "values", "blocks", "row_errors", "sparse", "row_sums"];
 /// Columns of sparse blocks beyond this many bytes wait for the end in a file without a name.
 const SPOOL: usize = 1 << 22;
 /// Entries are read back in chunks of about this many bytes.
@@ -137,8 +137,9 @@ impl MatrixWriter {
         self.structure.seek(SeekFrom::End(0)).map(|_| ()).map_err(io)
     }
 
-    /// Writes the rest and puts the file in its place. `row_errors`: estimated sum over j of |error of F_ij| per row.
-    pub fn finish(mut self, row_errors: &[f64]) -> Result<Outcome> {
+    /// Writes the rest and puts the file in its place. `row_errors`: estimated sum over j of |error of F_ij| per row;
+    /// `row_sums`: sum over j of F_ij per row, of the entries as they are stored.
+    pub fn finish(mut self, row_errors: &[f64], row_sums: &[f64]) -> Result<Outcome> {
         self.stream.begin("blocks")?;
         self.stream.append(bytemuck::cast_slice(&self.blocks))?;
         self.stream.begin("row_errors")?;
@@ -150,6 +151,8 @@ impl MatrixWriter {
         loop {
             let read = self.structure.read(&mut buffer).map_err(io)?;
             if read == 0 {
+                self.stream.begin("row_sums")?;
+                self.stream.append(bytemuck::cast_slice(row_sums))?;
                 return self.stream.finish();
             }
             self.stream.append(&buffer[..read])?;
@@ -158,7 +161,7 @@ impl MatrixWriter {
 }
 
 /// Writes a matrix of dense and triangular blocks that is in memory: its blocks, its entries, and per row the area A_i and
-/// the estimated sum over j of |error of F_ij|.
+/// the estimated sum over j of |error of F_ij|; without row sums.
 pub fn write(
     path: &Path,
     provenance: Provenance,
@@ -168,15 +171,16 @@ pub fn write(
     areas: &[f64],
     row_errors: &[f64],
 ) -> Result<Outcome> {
-    let mut stream = Stream::create(Partial::create(path)?, Kind::Matrix, provenance, &SECTIONS, record)?;
-    let contents: [&[u8]; SECTIONS.len()] = [
+    let [sections @ .., _] = SECTIONS;
+    let mut stream = Stream::create(Partial::create(path)?, Kind::Matrix, provenance, &sections, record)?;
+    let contents: [&[u8]; SECTIONS.len() - 1] = [
         bytemuck::cast_slice(areas),
         values.bytes(),
         bytemuck::cast_slice(blocks),
         bytemuck::cast_slice(row_errors),
         &[],
     ];
-    for (name, content) in SECTIONS.iter().zip(contents) {
+    for (name, content) in sections.iter().zip(contents) {
         stream.begin(name)?;
         stream.append(content)?;
     }

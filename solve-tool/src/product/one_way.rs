@@ -1,6 +1,7 @@
 //! Products with a matrix that is not symmetric: every entry is used once, for its own row, or once for its column
 //! where the transpose is asked for. Only imported matrices come here, so it is written plainly.
 
+use super::scratch::Buffer;
 use super::{Product, Task};
 use crate::kernel::Entry;
 use interchange::matrix::Values;
@@ -10,12 +11,12 @@ const LANES: usize = 8;
 
 impl Product<'_> {
     /// What a task adds to S x, on its span.
-    pub(super) fn run_one_way<const K: usize>(&self, task: &Task, x: [&[f64]; K]) -> [Vec<f64>; K] {
-        let mut y = std::array::from_fn(|_| self.scratch.zeros(task.span.len()));
+    pub(super) fn run_one_way<const K: usize>(&self, task: &Task, x: [&[f64]; K]) -> [Buffer; K] {
+        let mut y = std::array::from_fn(|_| self.scratch.zeros(task.length()));
         self.for_rows(task, |row, column, entries| {
             for k in 0..K {
                 let x = &x[k][column..];
-                y[k][row - task.span.start] += match entries {
+                y[k][row - task.base()] += match entries {
                     Values::F32(entries) => dot(entries, x),
                     Values::F64(entries) => dot(entries, x),
                 };
@@ -25,10 +26,10 @@ impl Product<'_> {
     }
 
     /// What a task adds to the transpose of S times x, on its span.
-    pub(super) fn run_transposed(&self, task: &Task, x: &[f64]) -> [Vec<f64>; 1] {
-        let mut y = self.scratch.zeros(task.span.len());
+    pub(super) fn run_transposed(&self, task: &Task, x: &[f64]) -> [Buffer; 1] {
+        let mut y = self.scratch.zeros(task.length());
         self.for_rows(task, |row, column, entries| {
-            let sums = &mut y[column - task.span.start..];
+            let sums = &mut y[column - task.base()..];
             sums.iter_mut().take(entries.len()).enumerate().for_each(|(j, y)| *y += entries.get(j) * x[row]);
         });
         [y]

@@ -64,10 +64,10 @@ impl Scene {
         Self::of_patches(&cube_patches(n), &[])
     }
 
-    /// Two unit rooms side by side in x, n x n elements a face, and in the wall between them a door in place of one
-    /// element near the middle. Elements of the first room come first.
-    pub fn two_rooms(n: usize) -> Self {
-        let door = (n / 2, n / 2);
+    /// Two unit rooms side by side in x, n x n elements a face, and in the wall between them a door in place of `door` x
+    /// `door` elements near the middle. Elements of the first room come first.
+    pub fn two_rooms(n: usize, door: usize) -> Self {
+        let first = n / 2 - door / 2;
         let mut patches = Vec::new();
         let mut wall = Vec::new();
         for room in 0..2 {
@@ -77,7 +77,9 @@ impl Scene {
                 let height = low[axis] + if far { 1.0 } else { 0.0 };
                 let mut cells = grid(low, axis, height, !far, n);
                 if axis == 0 && far == (room == 0) {
-                    cells[door.0 * n + door.1] = None;
+                    for a in first..first + door {
+                        cells[a * n + first..][..door].fill_with(|| None);
+                    }
                     if room == 0 {
                         wall.extend(cells.iter().flatten().map(|patch| patch.corners.clone()));
                     }
