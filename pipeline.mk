@@ -57,10 +57,11 @@ SHADE_TOOL      ?= $(BIN)shade-tool
 
 # ---- ERROR -> mesh fineness and tolerances -------------------------------------------------------------------------
 
-# The mesh decides the picture's error. The matrix tolerance bounds what the worst row states, the sum of all its |errors|, six times
-# ERROR: the mean row states a fifth of that, and as errors have both signs the light changes by an eighth of what a row is off
-# (Cornell box and a furnished room). What the solver proves takes all of them for one sign, so it is asked for three times ERROR, and stops
-# its own iteration far below that. The picture's tolerance bounds what lies between nodes, most of which is off by less than half of it.
+# The mesh decides the picture's error. The matrix tolerance bounds what the worst row states, the sum of all its |errors|, ten times
+# ERROR: the mean row states a seventh of that, and as errors have both signs the light changes by an eighth of what a row is off
+# (Cornell box and a furnished room; at 25 times ERROR points of the room were no farther from the truth). What the solver proves takes
+# all of them for one sign, so it is asked for five times ERROR, and stops its own iteration far below that. The picture's tolerance
+# bounds what lies between nodes, most of which is off by less than half of it.
 # A scene of many faces needs several elements for each before any can go where the light is, fewer for a rough picture. e is ERROR,
 # faces their number in the OBJ.
 define CALIBRATION
@@ -68,8 +69,8 @@ each = 0.14 / e; if (each > 11) each = 11;
 elements = 30 / e + each * faces;
 if (elements < 200) elements = 200;
 if (elements > 20000) elements = 20000;
-ff_tolerance = 6 * e; if (ff_tolerance > 0.5) ff_tolerance = 0.5;
-solve_tolerance = 3 * e; if (solve_tolerance > 0.5) solve_tolerance = 0.5;
+ff_tolerance = 10 * e; if (ff_tolerance > 0.5) ff_tolerance = 0.5;
+solve_tolerance = 5 * e; if (solve_tolerance > 0.5) solve_tolerance = 0.5;
 shade_tolerance = 2 * e; if (shade_tolerance > 0.5) shade_tolerance = 0.5;
 endef
 

@@ -14,11 +14,14 @@ use std::f64::consts::PI;
 
 /// The pairs of two clusters together may take so many times their share: all pairs of a row that look past something
 /// have a share, most of them are wholly seen or hidden and take nothing of it.
-const OF_POINTS: f64 = 2.0;
+const OF_POINTS: f64 = 1.4;
 /// Below this error of a factor relative to its value without blockers single points are not tried.
 const ONE_POINT: f64 = 0.02;
 /// Below this a few points are not tried either: too many pairs would be computed twice.
 const FEW_POINTS: f64 = 5e-3;
+/// From this tolerance on points serve nearer clusters, too: those whose sizes add up to this many times their distance.
+const ROUGH: f64 = 0.1;
+const ROUGH_NEAR: f64 = 1.5;
 /// A single pair between clusters at the limit of what serves may take so many times what must hold by itself: the
 /// limit is for elements face to face.
 const TURNED: f64 = 5.0;
@@ -86,7 +89,8 @@ impl Filling<'_> {
         }
         let middle = |cluster: &Cluster| cluster.hull.iter().sum::<glam::DVec3>() / cluster.hull.len() as f64;
         let distance = (middle(second) - middle(first)).length();
-        if first.radius + second.radius > NEAR * distance {
+        let near = if self.exact.tolerance >= ROUGH { ROUGH_NEAR } else { NEAR };
+        if first.radius + second.radius > near * distance {
             return false;
         }
         let patches = &self.exact.scene.patches;
