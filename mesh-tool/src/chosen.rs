@@ -50,12 +50,10 @@ pub fn choose(
     report: &mut Report,
     name: &(impl Fn(u32, Trouble) -> Error + Sync),
 ) -> Result<Chosen> {
-    let near = |floor: f64| {
-        if options.no_skip.leaves(Skip::Near) { nearness(cleaned, options, floor) } else { 0.0 }
-    };
+    let nearness = if options.no_skip.leaves(Skip::Near) { nearness(cleaned, options) } else { 0.0 };
     let budget = options.elements.filter(|_| options.no_skip.leaves(Skip::Budget) && !lines.is_empty());
     let Some(elements) = budget else {
-        return Ok(Chosen { drawings: draw(&lines, near(0.0))?, start: None });
+        return Ok(Chosen { drawings: draw(&lines, nearness)?, start: None });
     };
     // As coarse as without lines.
     let bare = draw(&[], 0.0)?;
@@ -65,7 +63,6 @@ pub fn choose(
     let wanted = f64::from(elements);
     let (meshes, spacing) = search.counted(UNIFORM * wanted)?;
     let (least, floor) = (crate::search::count(&meshes) as f64, FLOOR * spacing);
-    let nearness = near(floor);
 
     // The count rises with the number of lines: between the most that fit and the fewest that do not, linearly.
     let order = by_strength(&lines, cleaned, pieces);

@@ -129,19 +129,15 @@ const CURVATURE: f64 = 0.25;
 
 /// Lines pass each other and borders at least at this part of the wished length of edges: a kink so far from the nearest
 /// edge is interpolated with about this part of the error of one that no edge follows.
-const NEAR: f64 = 0.1;
-
-/// Where shape asks for more than that: at most this part.
-const NEAR_MOST: f64 = 0.25;
+const NEAR: f64 = 0.25;
 
 /// The distance that lines keep with the options' size of elements; zero where only a tolerance is given, which bounds no
-/// size from below. Edges shorter than `floor` are not made for shape, so that more would only give slivers.
-pub fn nearness(scene: &Cleaned, options: &Options, floor: f64) -> f64 {
+/// size from below.
+pub fn nearness(scene: &Cleaned, options: &Options) -> f64 {
     let by_count = options.elements.map(|count| spacing_of(scene, count));
     let by_length = options.max_edge.map(|length| SPACING_PER_MAX_EDGE * length);
     let spacing = [by_count, by_length].into_iter().flatten().reduce(f64::min);
-    let spacing = spacing.unwrap_or(0.0);
-    floor.clamp(NEAR * spacing, NEAR_MOST * spacing)
+    NEAR * spacing.unwrap_or(0.0)
 }
 
 /// Edge of as many equal triangles.
