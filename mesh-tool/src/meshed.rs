@@ -24,7 +24,7 @@ use glam::{DVec2, DVec3};
 const SLACK: f64 = 0.2;
 
 /// A layer in triangles that can be refined further.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Triangles {
     refinement: Refinement,
     triangulation: Triangulation,

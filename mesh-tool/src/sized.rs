@@ -19,6 +19,9 @@ use interchange::{Error, Result};
 /// The number of elements may miss what was asked for by this part, where they are refined for light.
 const REFINED_TOLERANCE: f64 = 0.1;
 
+/// The number to refine to is chosen at most so often.
+const AIMS: usize = 3;
+
 /// No edge is halved for the sake of shape below this part of the spacing, where the number of elements is given, ...
 pub const FLOOR: f64 = 0.05;
 /// ... and where only a length is.
@@ -64,19 +67,29 @@ pub fn sized(
     };
     if let Some(light) = light {
         let spacing = (search.area() / (EQUILATERAL * wanted)).sqrt();
-        let mut meshes = match start {
+        let start = match start {
             Some(meshes) => meshes,
             None => search.counted(UNIFORM * wanted)?.0,
         };
-        if (count(&meshes) as f64) < (1.0 - COUNT_TOLERANCE) * wanted {
-            lit::refine(light, drawings, &mut meshes, wanted, spacing, report)
+        let mut aim = wanted;
+        for _ in 0..AIMS {
+            if count(&start) as f64 >= (1.0 - COUNT_TOLERANCE) * aim {
+                break;
+            }
+            let mut meshes = start.clone();
+            lit::refine(light, drawings, &mut meshes, aim, spacing, report)
                 .map_err(|(layer, trouble)| name(drawings[layer].layer().sheets[0].face, trouble))?;
             report.count("planes that do not meet others everywhere", search.meet(&mut meshes));
             let found = count(&meshes) as f64;
             // Where light changes nowhere, only a uniform mesh can use up the rest.
-            if (found / wanted - 1.0).abs() <= REFINED_TOLERANCE {
+            if found < (1.0 - REFINED_TOLERANCE) * wanted {
+                break;
+            }
+            if found <= (1.0 + REFINED_TOLERANCE) * wanted {
                 return Ok(meshes);
             }
+            // Edges that meet those of other planes took more than there was: leave room for them.
+            aim *= wanted / found;
         }
     }
     let meshes = search.counted(wanted)?.0;
