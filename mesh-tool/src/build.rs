@@ -75,8 +75,8 @@ impl Options {
     }
 
     /// Highest order of lines that is drawn. Curvature lines do not pay in scenes with few elements for each: in the Cornell box
-    /// of 1000 and 2000 elements irradiance at reference points is off by 1.01 and 0.64 % with slope lines, by 1.22 and
-    /// 0.68 % with curvature lines besides (BENCHMARKING.md).
+    /// of 1000 elements irradiance at reference points is off by 1.01 % with slope lines, by 1.33 % with curvature lines
+    /// besides; in a room of 5000 by 2.12 and 1.96 % (BENCHMARKING.md).
     pub fn order(&self) -> Order {
         self.discontinuity.unwrap_or(Order::D1)
     }
