@@ -125,7 +125,9 @@ fn no_edge_is_longer_than_asked() {
         [("cornell_blocks.obj", 60.0), ("goral_cube.obj", 0.17), ("stress/stress_intersect.obj", 0.1)]
     {
         let (mesh, report) = made(&read(name), max_edge(length));
-        assert!(report.estimates["longest edge"] <= length, "{name}");
+        // Positions in space are rounded once more than the coordinates in the plane that are compared.
+        let longest = report.estimates["longest edge"];
+        assert!(longest <= length * (1.0 + 1e-12), "{name}: {longest}");
         assert_areas(&mesh, 1e-12);
         assert_conforming(&mesh);
     }
