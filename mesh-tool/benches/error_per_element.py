@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Error against the number of elements, for four ways of making them.
 
-    error_per_element.py FOLDER_OF_PROGRAMS [SCENE ...] [--elements N,N,...] [--matrix E]
+    error_per_element.py FOLDER_OF_PROGRAMS [SCENE ...] [--elements N,N,...] [--matrix E] [--ways WAY,WAY,...]
 
 Runs mesh, factors and solution for every way, and compares the irradiance that is gathered at the points of
 tests/reference with the values there. Prints one table per scene, in Markdown: root mean square of the relative error over
@@ -54,17 +54,8 @@ class Chain:
 
     def mesh(self, count, lit, lines):
         """A mesh of about `count` elements; the number it has."""
-        if lit:
-            return self.build("--elements", count, lines=lines)["counters"]["elements"]
-        # The longest edge that gives the count: area falls with its square.
-        report = self.build("--elements", count, lines="off")
-        edge = 1.9 * (report["estimates"]["area of elements"] / count) ** 0.5
-        for _ in range(6):
-            found = self.build("--max-edge", edge, lines=lines)["counters"]["elements"]
-            if abs(found / count - 1) < 0.05:
-                break
-            edge *= min(max((found / count) ** 0.5, 0.5), 2.0)
-        return found
+        even = [] if lit else ["--even"]
+        return self.build("--elements", count, *even, lines=lines)["counters"]["elements"]
 
     def error(self):
         """Root mean square of the relative error."""
@@ -97,12 +88,15 @@ def main():
     parser.add_argument("scenes", nargs="*")
     parser.add_argument("--elements", default="500,1000,2000,4000")
     parser.add_argument("--matrix", default="1e-3")
+    parser.add_argument("--ways", default=",".join(name.replace(", ", " ") for name, _, _ in WAYS))
     asked = parser.parse_args()
+    names = asked.ways.split(",")
+    ways = [way for name in names for way in WAYS if way[0].replace(", ", " ") == name]
     counts = [int(n) for n in asked.elements.split(",")]
     for scene in asked.scenes or SCENES:
         print(f"| {scene} | " + " | ".join(f"{n}" for n in counts) + " |")
         print("|---|" + "---|" * len(counts))
-        for name, lit, lines in WAYS:
+        for name, lit, lines in ways:
             cells = []
             for count in counts:
                 with tempfile.TemporaryDirectory() as folder:

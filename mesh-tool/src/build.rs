@@ -1,6 +1,7 @@
 //! The whole of `mesh-tool build`: scene in, mesh out, with a report of every repair.
 
 use crate::assemble::assemble;
+use crate::chosen::choose;
 use crate::clean::{Cleaned, Face, clean};
 use crate::conform;
 use crate::contact::Pieces;
@@ -18,7 +19,7 @@ use crate::sized::sized;
 use crate::solids::Solids;
 use crate::solved::{self, Solved};
 use crate::steps::{Off, Skip, Step};
-use crate::strength::strongest;
+use crate::strength::{affordable, by_strength, first};
 use crate::triangulation::Trouble;
 use geometry::plane::PLANARITY;
 use geometry::polygon;
@@ -34,6 +35,9 @@ use rayon::prelude::*;
 use std::collections::{BTreeSet, HashSet};
 use std::time::Instant;
 
+/// Lines of secondary sources may cost this part of the elements.
+const SECONDARY: f64 = 0.4;
+
 /// What the elements should be. With no size, tolerance or order of lines the faces are elements as given; with several
 /// sizes, the finest wins.
 #[derive(Debug, Clone, Default)]
@@ -42,6 +46,8 @@ pub struct Options {
     pub max_edge: Option<f64>,
     /// About this many elements in the whole scene, small where light changes; without emitters of equal area.
     pub elements: Option<u32>,
+    /// With a number of elements: of equal size, whatever the light.
+    pub even: bool,
     /// Interpolating the direct light over the nodes of an element may miss it by this part of the mean light.
     pub tolerance: Option<f64>,
     /// Refine the mesh that the other options make by the error of this solution on it.
@@ -69,8 +75,8 @@ impl Options {
     }
 
     /// Highest order of lines that is drawn. Curvature lines do not pay in scenes with few elements for each: in the Cornell box
-    /// of 1000 and 2000 elements irradiance at reference points is off by 1.01 and 0.64 % with slope lines, by 1.22 and
-    /// 0.68 % with curvature lines besides (BENCHMARKING.md).
+    /// of 1000 elements irradiance at reference points is off by 1.01 % with slope lines, by 1.33 % with curvature lines
+    /// besides; in a room of 5000 by 2.12 and 1.96 % (BENCHMARKING.md).
     pub fn order(&self) -> Order {
         self.discontinuity.unwrap_or(Order::D1)
     }
@@ -80,6 +86,7 @@ impl Options {
         let mut flags: Vec<String> = Vec::new();
         flags.extend(self.max_edge.map(|length| format!("--max-edge {}", number(length))));
         flags.extend(self.elements.map(|count| format!("--elements {count}")));
+        flags.extend(self.even.then(|| "--even".to_owned()));
         flags.extend(self.tolerance.map(|tolerance| format!("--tolerance {}", number(tolerance))));
         flags.extend(self.discontinuity.and_then(|order| {
             let value = clap::ValueEnum::to_possible_value(&order)?;
@@ -136,36 +143,25 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
         note(report, "regions", start);
 
         let start = Instant::now();
-        let mut lines = discontinuity_lines(&cleaned, &pieces, options, report);
-        if let Some(count) = options.elements.filter(|_| options.no_skip.leaves(Skip::Budget)) {
-            let before = lines.len();
-            lines = strongest(lines, &cleaned, &pieces, count);
-            report.count("skipped: lines too weak for the number of elements", before - lines.len());
-        }
-        let drawn = Drawn { pieces: &pieces, lines: &lines, order: options.order(), solids: &solids, off };
-        drawings = (0..layers.len())
-            .into_par_iter()
-            .map(|k| {
-                let layer = &layers[k];
-                let same_plane = |other: &&Layer| {
-                    other.reversed != layer.reversed && other.frame.plane == layer.frame.plane
-                };
-                let opposite = [k.checked_sub(1), Some(k + 1)]
-                    .into_iter()
-                    .flatten()
-                    .filter_map(|other| layers.get(other))
-                    .find(same_plane);
-                Drawing::new(layer.clone(), opposite, &cleaned, drawn)
-                    .map_err(|trouble| name(&cleaned.faces, layer.sheets[0].face, trouble))
-            })
-            .collect::<Result<_>>()?;
+        let lines = discontinuity_lines(&cleaned, &pieces, options, report);
+        let name = |face: u32, trouble: Trouble| name(&cleaned.faces, face, trouble);
+        let draw = |lines: &[DrawnLine], nearness: f64| {
+            let drawn =
+                Drawn { pieces: &pieces, lines, nearness, order: options.order(), solids: &solids, off };
+            drawings_of(&layers, &cleaned, drawn, &name)
+        };
+        let mut chosen = choose(scene, (&cleaned, &pieces), lines, draw, options, report, &name)?;
+        report.count(
+            "skipped: lines too close to others",
+            chosen.drawings.iter().map(|drawing| drawing.gone).sum(),
+        );
         note(report, "lines", start);
         let start = Instant::now();
-        let lit = options.elements.is_some() || options.tolerance.is_some();
+        let lit = (options.elements.is_some() && !options.even) || options.tolerance.is_some();
         let light = lit.then(|| Light::new(&cleaned, &pieces)).flatten();
-        let name = |face: u32, trouble: Trouble| name(&cleaned.faces, face, trouble);
         let tolerance = cleaned.places.tolerance();
-        let mut meshes = sized(scene, &drawings, light.as_ref(), options, &cleaned.places, report, &name)?;
+        let mut meshes = sized(scene, &mut chosen, light.as_ref(), options, &cleaned.places, report, &name)?;
+        drawings = chosen.drawings;
         let made = |meshes: &[Triangles]| -> Vec<(&Layer, Patch)> {
             let patches = drawings.par_iter().zip(meshes).map(|(drawing, mesh)| drawing.patch(mesh));
             drawings.iter().map(Drawing::layer).zip(patches.collect::<Vec<_>>()).collect()
@@ -180,7 +176,9 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
             solved.refine(&drawings, &mut meshes, asked, tolerance, report).map_err(fail)?;
             if !sources.is_empty() && options.order() >= Order::D1 {
                 let mut lines = lines_of(&cleaned, &pieces, sources, options, report);
-                lines = strongest(lines, &cleaned, &pieces, base.element_count() as u32);
+                let order = by_strength(&lines, &cleaned, &pieces);
+                let count = affordable(&lines, &order, &cleaned, base.element_count() as u32, SECONDARY);
+                lines = first(&lines, &order, count);
                 report.count("lines of secondary sources", lines.len());
                 for (drawing, mesh) in drawings.iter().zip(&mut meshes) {
                     // Where they tangle with what is there, they are left out.
@@ -277,6 +275,24 @@ fn lines_of(
     let skips = &options.no_skip;
     let (order, eee) = (options.order(), options.eee);
     discontinuity::Drawing { scene: cleaned, pieces, sources, order, skips, eee }.lines(report)
+}
+
+/// Draws all layers. `name` names the face of an error.
+fn drawings_of(
+    layers: &[Layer],
+    cleaned: &Cleaned,
+    drawn: Drawn,
+    name: &(impl Fn(u32, Trouble) -> Error + Sync),
+) -> Result<Vec<Drawing>> {
+    let same_plane = |a: &Layer, b: &Layer| a.reversed != b.reversed && a.frame.plane == b.frame.plane;
+    let draw = |k: usize| {
+        let layer = &layers[k];
+        let beside = [k.checked_sub(1), Some(k + 1)].into_iter().flatten().filter_map(|k| layers.get(k));
+        let opposite = beside.into_iter().find(|other| same_plane(other, layer));
+        Drawing::new(layer.clone(), opposite, cleaned, drawn)
+            .map_err(|trouble| name(layer.sheets[0].face, trouble))
+    };
+    (0..layers.len()).into_par_iter().map(draw).collect()
 }
 
 /// Layers of faces that are meshed together: each face alone where overlaps or meeting edges are not cared for.

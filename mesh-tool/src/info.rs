@@ -192,6 +192,16 @@ fn mesh_page(path: &Path, mesh: &Mesh, provenance: &Provenance, digest: Digest) 
         format!("{title}{}\n", parts.join(", "))
     };
     page += &histogram("angles     smallest, degrees: ", &angle_histogram(mesh));
+    if quality.narrow > 0 {
+        let _ = writeln!(
+            page,
+            "narrow     {} elements below 25 degrees: {} where lines or borders meet so, {} in strips between them, {} others",
+            quality.narrow,
+            quality.narrow_at_given_angles,
+            quality.narrow_in_strips,
+            quality.narrow_freely()
+        );
+    }
     page += &histogram("sizes      longest edge, parts of the extent: ", &size_histogram(mesh));
     let hidden: f64 = mesh.hidden_areas.iter().sum();
     if hidden > 0.0 {
@@ -283,6 +293,12 @@ fn mesh_json(mesh: &Mesh, provenance: &Provenance, digest: Digest) -> String {
         "longest_edge": quality.longest_edge,
         "smallest_angle_deg": quality.smallest_angle_deg,
         "median_smallest_angle_deg": quality.median_smallest_angle_deg,
+        "narrow_elements": {
+            "count": quality.narrow,
+            "at_given_angles": quality.narrow_at_given_angles,
+            "in_strips": quality.narrow_in_strips,
+            "others": quality.narrow_freely(),
+        },
         "materials": mesh.materials,
         "groups": groups,
     });

@@ -21,9 +21,11 @@
 #![forbid(unsafe_code)]
 
 pub mod adaptive;
+pub mod arranged;
 pub mod assemble;
 pub mod box_tree;
 pub mod build;
+pub mod chosen;
 pub mod clean;
 pub mod cluster;
 pub mod compare;
@@ -46,6 +48,7 @@ pub mod lit;
 pub mod look;
 pub mod merge_lines;
 pub mod meshed;
+pub mod near;
 pub mod nodes;
 pub mod orient;
 pub mod outline;
@@ -56,6 +59,7 @@ pub mod planar;
 pub mod quality;
 pub mod refine;
 pub mod regions;
+pub mod search;
 pub mod seeds;
 pub mod sheets;
 pub mod sized;

@@ -141,6 +141,9 @@ struct SizeArgs {
     /// Mesh with about this many triangles, smaller where light changes; with --max-edge too, the finer of the two wins
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     elements: Option<u32>,
+    /// With --elements: triangles of equal size, whatever the light
+    #[arg(long, requires = "elements", conflicts_with = "tolerance")]
+    even: bool,
     /// Mesh as fine as this wants: interpolating direct light between the nodes of an element misses it by no more than
     /// E of the mean light; with --elements, that many elements at most
     #[arg(long, value_name = "E", value_parser = tool::positive)]
@@ -181,6 +184,7 @@ impl SizeArgs {
             sources: self.sources,
             max_edge: self.max_edge,
             elements: self.elements,
+            even: self.even,
             tolerance: self.tolerance,
             discontinuity: self.discontinuity,
             eee: self.eee,

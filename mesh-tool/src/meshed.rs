@@ -1,15 +1,15 @@
 //! Meshing: all sheets of a layer are triangulated together, so that their elements meet edge to edge, with the
 //! borders of the faces and the contact lines as edges.
 
+use crate::arranged::{Arranged, arranged};
 use crate::clean::Cleaned;
 use crate::conform::EdgeSplit;
 use crate::contact::{ContactLine, Pieces, contact_lines};
 use crate::discontinuity::{DrawnLine, Order};
 use crate::frame::stepped;
-use crate::given::drawn;
-use crate::hidden::{HIDDEN, HiddenParts, draw_contacts};
+use crate::hidden::{HIDDEN, HiddenParts};
 use crate::patch::{Patch, PatchElement, PatchLine};
-use crate::planar::{Contact, PlanarGraph, Point};
+use crate::planar::{Contact, PlanarGraph};
 use crate::refine::{Refinement, Target};
 use crate::regions::{overlapped_area, winner};
 use crate::seeds::lattice;
@@ -24,7 +24,7 @@ use glam::{DVec2, DVec3};
 const SLACK: f64 = 0.2;
 
 /// A layer in triangles that can be refined further.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Triangles {
     refinement: Refinement,
     triangulation: Triangulation,
@@ -80,7 +80,7 @@ impl Triangles {
 }
 
 /// A layer ready to be meshed at any size: everything that does not depend on the size is done.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Drawing {
     layer: Layer,
     graph: PlanarGraph,
@@ -91,6 +91,8 @@ pub struct Drawing {
     overlapped: f64,
     crossing: usize,
     lost_emitters: Vec<(u32, u32)>,
+    /// Lines that are gone, because others pass too close.
+    pub gone: usize,
     /// Area that the elements will cover, in square units of length.
     pub area: f64,
 }
@@ -102,6 +104,8 @@ pub struct Drawn<'a> {
     pub pieces: &'a Pieces,
     /// Discontinuity lines of the whole scene.
     pub lines: &'a [DrawnLine],
+    /// Lines keep this distance from each other and from borders, in units of length.
+    pub nearness: f64,
     /// Highest order that is wished.
     pub order: Order,
     /// Bodies that hide parts.
@@ -119,38 +123,13 @@ impl Drawing {
         scene: &Cleaned,
         drawn_lines: Drawn,
     ) -> Result<Drawing, Trouble> {
-        let Drawn { pieces, lines, order, solids, off } = drawn_lines;
+        let Drawn { pieces, lines, nearness, order, solids, off } = drawn_lines;
         let mut contacts = contact_lines(&layer, scene, pieces);
         contacts.retain(|line| off.leaves(if line.crosses { Step::Cross } else { Step::Meet }));
-        // Where faces lie too close to be told apart, nothing is taken for hidden, ...
+        // Where faces lie too close to be told apart, nothing is taken for hidden.
         let hidden = HiddenParts::of(&layer, opposite, &contacts, scene, solids).unwrap_or_default();
-        let with = |hidden: &HiddenParts, lines: &[DrawnLine]| {
-            drawn(&layer, 0..layer.sheets.len() as u32, scene, |graph| {
-                draw_contacts(graph, &layer, &contacts, |_| 0);
-                hidden.draw(graph);
-                for (index, sheet) in layer.sheets.iter().enumerate() {
-                    let own = lines.iter().filter(|line| line.face == sheet.face && line.side == sheet.side);
-                    for line in own {
-                        let [from, to] = line.ends.map(|position| {
-                            graph.point(Point { uv: layer.frame.flatten(position), position, place: None })
-                        });
-                        let contact = Contact { sheet: index as u32, source: line.source, order: line.order };
-                        graph.contact(from, to, contact);
-                    }
-                }
-            })
-        };
-        let tolerance = scene.places.tolerance() / layer.frame.size;
-        // ... and lines of light that tangle are left out.
-        let (hidden, arranged) = match with(&hidden, lines).arrange(tolerance) {
-            Ok(arranged) => (hidden, arranged),
-            Err(_) => {
-                let none = HiddenParts::default();
-                let arranged = with(&none, &[]).arrange(tolerance)?;
-                (none, arranged)
-            }
-        };
-        let (mut graph, triangulation) = arranged;
+        let Arranged { mut graph, triangulation, hidden, gone } =
+            arranged(&layer, scene, &contacts, hidden, lines, nearness)?;
         let rings = layer
             .sheets
             .iter()
@@ -189,6 +168,7 @@ impl Drawing {
             overlapped,
             crossing: crossed.len(),
             lost_emitters: losers.into_iter().filter(|(sheet, _)| emits(sheet)).collect(),
+            gone,
             area,
             layer,
         })

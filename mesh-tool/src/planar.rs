@@ -283,7 +283,7 @@ impl PlanarGraph {
     }
 
     /// The point at `t` (0 to 1) along an edge.
-    fn along(&self, edge: usize, t: f64) -> Point {
+    pub fn along(&self, edge: usize, t: f64) -> Point {
         let [a, b] = [self.edges[edge].from, self.edges[edge].to].map(|p| self.points[p as usize]);
         Point { uv: a.uv.lerp(b.uv, t), position: a.position.lerp(b.position, t), place: None }
     }

@@ -20,7 +20,9 @@ pub fn measure(mesh: &Mesh, report: &mut Report) {
     report.estimate("smallest angle deg", quality.smallest_angle_deg);
     report.estimate("median smallest angle deg", quality.median_smallest_angle_deg);
     report.count("elements below 25 deg", quality.narrow);
-    report.count("elements below 25 deg that no line or border forces", quality.narrow_freely);
+    report.count("elements below 25 deg where lines or borders meet so", quality.narrow_at_given_angles);
+    report.count("elements below 25 deg in strips between lines or borders", quality.narrow_in_strips);
+    report.count("elements below 25 deg that no line or border forces", quality.narrow_freely());
     report.count("neighbours of more than twice the size", quality.uneven);
 }
 
@@ -39,13 +41,21 @@ pub struct Quality {
     pub median_smallest_angle_deg: f64,
     /// Elements with an angle below 25 degrees.
     pub narrow: usize,
-    /// Of these, elements whose smallest angle is not one between two lines or borders.
-    pub narrow_freely: usize,
+    /// Of these, elements whose smallest angle is one between two lines or borders.
+    pub narrow_at_given_angles: usize,
+    /// Of the others, elements with all corners on lines or borders: these pass each other more closely than the edges
+    /// along them are long. More elements would make them wider.
+    pub narrow_in_strips: usize,
     /// Pairs of elements across an edge, the longest edge of one more than twice that of the other.
     pub uneven: usize,
 }
 
 impl Quality {
+    /// Elements with an angle below 25 degrees that neither a given angle nor a strip excuses.
+    pub fn narrow_freely(&self) -> usize {
+        self.narrow - self.narrow_at_given_angles - self.narrow_in_strips
+    }
+
     /// Measures a mesh.
     pub fn of(mesh: &Mesh) -> Quality {
         let faces = (0..mesh.face_count()).map(interchange::ids::FaceId::new);
@@ -69,7 +79,14 @@ impl Quality {
         }
         let uneven = sides.values().filter(|l| l.len() == 2 && l[0].max(l[1]) > 2.0 * l[0].min(l[1])).count();
         let (mut element_area, mut longest_edge, mut angles) = (0.0, 0.0f64, Vec::new());
-        let (mut narrow, mut narrow_freely) = (0, 0);
+        let given =
+            |face: u32, (a, b): (u32, u32)| lines.contains(&(a, b)) || sides[&(face, a, b)].len() == 1;
+        let on_given: HashSet<(u32, u32)> = sides
+            .keys()
+            .filter(|&&(face, a, b)| given(face, (a, b)))
+            .flat_map(|&(face, a, b)| [(face, a), (face, b)])
+            .collect();
+        let (mut narrow, mut narrow_at_given_angles, mut narrow_in_strips) = (0, 0, 0);
         for element in mesh.element_ids() {
             let corners = mesh.element_corners(element);
             element_area += polygon::area(&corners);
@@ -81,9 +98,12 @@ impl Quality {
                 let ring = mesh.elements.row(element.index());
                 let face = mesh.element_faces[element.index()].0;
                 let edges: Vec<(u32, u32)> = edges_of(ring).collect();
-                let given = |(a, b): (u32, u32)| lines.contains(&(a, b)) || sides[&(face, a, b)].len() == 1;
-                let n = edges.len();
-                narrow_freely += usize::from(!(given(edges[at]) && given(edges[(at + n - 1) % n])));
+                let before = (at + edges.len() - 1) % edges.len();
+                if given(face, edges[at]) && given(face, edges[before]) {
+                    narrow_at_given_angles += 1;
+                } else {
+                    narrow_in_strips += usize::from(ring.iter().all(|v| on_given.contains(&(face, v.0))));
+                }
             }
         }
         angles.sort_by(f64::total_cmp);
@@ -94,7 +114,8 @@ impl Quality {
             smallest_angle_deg: angles.first().copied().unwrap_or(0.0),
             median_smallest_angle_deg: angles.get(angles.len() / 2).copied().unwrap_or(0.0),
             narrow,
-            narrow_freely,
+            narrow_at_given_angles,
+            narrow_in_strips,
             uneven,
         }
     }

@@ -40,6 +40,8 @@ pub enum Skip {
     Order,
     /// Of more lines than the asked number of elements can follow, only the strongest
     Budget,
+    /// Lines that pass each other or a border more closely than elements can follow are led through what is there
+    Near,
 }
 
 /// A set of names that were switched off.

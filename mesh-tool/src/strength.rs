@@ -1,12 +1,13 @@
 //! Where lines of an emitter can matter: on receivers that it reaches, past something that stands between, with light
 //! enough to be seen.
 
+use crate::build::Options;
 use crate::clean::Cleaned;
 use crate::contact::Pieces;
 use crate::discontinuity::{DrawnLine, Emitter};
 use crate::light::{Light, Lit};
+use crate::search::{EQUILATERAL, SPACING_PER_MAX_EDGE};
 use crate::sheets::bounds;
-use crate::sized::EQUILATERAL;
 use crate::wedge::Surroundings;
 use geometry::gather::Scratch;
 use geometry::occluder::separated;
@@ -123,22 +124,31 @@ pub fn weak_pairs(
 
 /// Elements that a line costs for each element that it is long, and besides: its ends and crossings.
 const COST: (f64, f64) = (2.0, 4.0);
-/// Lines may cost this part of the elements.
-const SHARE: f64 = 0.4;
 /// A jump in curvature counts this part of one in slope.
 const CURVATURE: f64 = 0.25;
 
-/// The strongest of the lines, as many as `elements` elements can follow: strength is the light that the source could
-/// give, unblocked, to the line's middle, times its length. The order of the lines stays.
-pub fn strongest(lines: Vec<DrawnLine>, scene: &Cleaned, pieces: &Pieces, elements: u32) -> Vec<DrawnLine> {
+/// Lines pass each other and borders at least at this part of the wished length of edges: a kink so far from the nearest
+/// edge is interpolated with about this part of the error of one that no edge follows.
+const NEAR: f64 = 0.25;
+
+/// The distance that lines keep with the options' size of elements; zero where only a tolerance is given, which bounds no
+/// size from below.
+pub fn nearness(scene: &Cleaned, options: &Options) -> f64 {
+    let by_count = options.elements.map(|count| spacing_of(scene, count));
+    let by_length = options.max_edge.map(|length| SPACING_PER_MAX_EDGE * length);
+    let spacing = [by_count, by_length].into_iter().flatten().reduce(f64::min);
+    NEAR * spacing.unwrap_or(0.0)
+}
+
+/// Edge of as many equal triangles.
+fn spacing_of(scene: &Cleaned, elements: u32) -> f64 {
     let area: f64 = scene.faces.iter().map(|face| polygon::area(&scene.places.corners(&face.corners))).sum();
-    let spacing = (area / (EQUILATERAL * f64::from(elements))).sqrt();
-    let length = |line: &DrawnLine| line.ends[0].distance(line.ends[1]);
-    let cost = |line: &DrawnLine| COST.0 * length(line) / spacing + COST.1;
-    let mut left = SHARE * f64::from(elements);
-    if lines.iter().map(cost).sum::<f64>() <= left {
-        return lines;
-    }
+    (area / (EQUILATERAL * f64::from(elements))).sqrt()
+}
+
+/// The numbers of the lines, the strongest first: strength is the light that the source could give, unblocked, to the line's
+/// middle, times its length.
+pub fn by_strength(lines: &[DrawnLine], scene: &Cleaned, pieces: &Pieces) -> Vec<usize> {
     let strength = |line: &DrawnLine| {
         let point = 0.5 * (line.ends[0] + line.ends[1]);
         let plane = scene.faces[line.face as usize].plane;
@@ -147,18 +157,29 @@ pub fn strongest(lines: Vec<DrawnLine>, scene: &Cleaned, pieces: &Pieces, elemen
         let shone =
             |piece: &Vec<u32>| point_factor(point, normal, &scene.places.corners(piece), &mut cut).abs();
         let light: f64 = pieces[line.source as usize].iter().map(shone).sum();
-        light * length(line) * if line.order < 2 { 1.0 } else { CURVATURE }
+        light * line.ends[0].distance(line.ends[1]) * if line.order < 2 { 1.0 } else { CURVATURE }
     };
     let strengths: Vec<f64> = lines.par_iter().map(strength).collect();
     let mut order: Vec<usize> = (0..lines.len()).collect();
     order.sort_by(|&a, &b| strengths[b].total_cmp(&strengths[a]).then(a.cmp(&b)));
-    let mut kept = vec![false; lines.len()];
-    for k in order {
-        left -= cost(&lines[k]);
-        if left < 0.0 {
-            break;
-        }
-        kept[k] = true;
-    }
-    lines.into_iter().zip(kept).filter(|(_, kept)| *kept).map(|(line, _)| line).collect()
+    order
+}
+
+/// How many lines, in this order, cost no more than the part `share` of so many elements, by a guess.
+pub fn affordable(lines: &[DrawnLine], order: &[usize], scene: &Cleaned, elements: u32, share: f64) -> usize {
+    let spacing = spacing_of(scene, elements);
+    let cost = |line: &DrawnLine| COST.0 * line.ends[0].distance(line.ends[1]) / spacing + COST.1;
+    let mut left = share * f64::from(elements);
+    let fits = |&&line: &&usize| {
+        left -= cost(&lines[line]);
+        left >= 0.0
+    };
+    order.iter().take_while(fits).count()
+}
+
+/// The first `count` lines in this order, as they were ordered before.
+pub fn first(lines: &[DrawnLine], order: &[usize], count: usize) -> Vec<DrawnLine> {
+    let mut kept = order[..count].to_vec();
+    kept.sort_unstable();
+    kept.into_iter().map(|line| lines[line]).collect()
 }

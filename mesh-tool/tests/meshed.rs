@@ -24,15 +24,14 @@ fn cornell_box_is_covered_conforming_and_well_shaped() {
     assert!((count / 3000.0 - 1.0).abs() < 0.15, "{count} elements");
     assert_areas(&mesh, 1e-12);
     assert!(assert_conforming(&mesh) > 4000);
-    // Curvature lines cross at down to one degree: within such a wedge, and beside its tip, angles cannot be wide.
-    let narrow = report.counters["elements below 25 deg that no line or border forces"];
-    assert!(narrow < 100, "{narrow}");
     assert!(report.estimates["median smallest angle deg"] > 43.0);
-    let slope = Options { discontinuity: Some(Order::D1), ..elements(3000) };
-    let (_, report) = made(&read("cornell_blocks.obj"), slope);
-    assert_eq!(report.counters["elements below 25 deg that no line or border forces"], 0);
-    assert_eq!(report.counters["neighbours of more than twice the size"], 0);
-    assert!(report.estimates["smallest angle deg"] > 25.0);
+    for order in [Order::D1, Order::D2] {
+        let lines = Options { discontinuity: Some(order), ..elements(3000) };
+        let (_, report) = made(&read("cornell_blocks.obj"), lines);
+        assert_eq!(report.counters["elements below 25 deg"], 0);
+        assert_eq!(report.counters["neighbours of more than twice the size"], 0);
+        assert!(report.estimates["smallest angle deg"] > 24.999_999);
+    }
     assert!(mesh.element_nodes.rows().all(|nodes| nodes.len() == 6));
     // Published vertices are kept to the last bit.
     for vertex in read("cornell_blocks.obj").vertices {
@@ -45,6 +44,23 @@ fn cornell_box_is_covered_conforming_and_well_shaped() {
         .map(|(_, area)| area)
         .sum();
     assert!((ceiling - 297_265.2).abs() < 1e-6, "{ceiling}");
+}
+
+/// Legs 4 cm wide cannot be wide triangles in 6000 elements (43,000 would do): what is narrow is mostly in strips.
+#[test]
+fn lines_of_a_furnished_room_add_few_narrow_elements() {
+    let narrow = |order: Order| {
+        let options = Options { discontinuity: Some(order), ..elements(6000) };
+        let (mesh, report) = made(&read("room.obj"), options);
+        let count = mesh.element_count() as f64;
+        assert!((count / 6000.0 - 1.0).abs() <= 0.1, "{count} elements");
+        let free = report.counters["elements below 25 deg that no line or border forces"];
+        (report.counters["elements below 25 deg"] as f64, free)
+    };
+    let ((without, _), (with, free)) = (narrow(Order::D0), narrow(Order::D1));
+    // Measured 2025 and 2343, of these 292 neither in strips nor at given angles.
+    assert!(with < 1.2 * without, "{without} {with}");
+    assert!(free < 350, "{free}");
 }
 
 #[test]
@@ -109,7 +125,9 @@ fn no_edge_is_longer_than_asked() {
         [("cornell_blocks.obj", 60.0), ("goral_cube.obj", 0.17), ("stress/stress_intersect.obj", 0.1)]
     {
         let (mesh, report) = made(&read(name), max_edge(length));
-        assert!(report.estimates["longest edge"] <= length, "{name}");
+        // Positions in space are rounded once more than the coordinates in the plane that are compared.
+        let longest = report.estimates["longest edge"];
+        assert!(longest <= length * (1.0 + 1e-12), "{name}: {longest}");
         assert_areas(&mesh, 1e-12);
         assert_conforming(&mesh);
     }
