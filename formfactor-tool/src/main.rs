@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Lines to try, in `--help` and the manual page.
-const EXAMPLES: [&str; 8] = [
+const EXAMPLES: [&str; 9] = [
     "formfactor-tool compute box.mesh -o box.ff --tolerance 1e-3",
     "formfactor-tool compute finer.mesh -o finer.ff --tolerance 1e-3 --reuse box.ff --reuse-mesh box.mesh",
     "formfactor-tool info box.ff",
