@@ -29,6 +29,7 @@ use interchange::provenance::Provenance;
 use interchange::report::Report;
 use interchange::scene::Scene;
 use interchange::tables::number;
+use interchange::tool::progress;
 use interchange::{Error, Result};
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashSet};
@@ -143,9 +144,11 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
             report.count("skipped: lines too weak for the number of elements", before - lines.len());
         }
         let drawn = Drawn { pieces: &pieces, lines: &lines, order: options.order(), solids: &solids, off };
+        let bar = progress("lines on planes", layers.len());
         drawings = (0..layers.len())
             .into_par_iter()
             .map(|k| {
+                bar.inc(1);
                 let layer = &layers[k];
                 let same_plane = |other: &&Layer| {
                     other.reversed != layer.reversed && other.frame.plane == layer.frame.plane
@@ -159,6 +162,7 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
                     .map_err(|trouble| name(&cleaned.faces, layer.sheets[0].face, trouble))
             })
             .collect::<Result<_>>()?;
+        drop(bar);
         note(report, "lines", start);
         let start = Instant::now();
         let lit = options.elements.is_some() || options.tolerance.is_some();

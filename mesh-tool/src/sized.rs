@@ -11,6 +11,7 @@ use crate::steps::Step;
 use crate::triangulation::Trouble;
 use interchange::report::Report;
 use interchange::scene::Scene;
+use interchange::tool::progress;
 use interchange::{Error, Result};
 use rayon::prelude::*;
 
@@ -119,11 +120,13 @@ impl<Name: Fn(u32, Trouble) -> Error + Sync> Search<'_, Name> {
                 ),
             ));
         }
+        let bar = progress("planes", self.drawings.len());
         let mut meshes: Vec<Triangles> = self
             .drawings
             .par_iter()
             .map(|drawing| {
                 let mesh = drawing.mesh(spacing, self.max_edge, self.floor);
+                bar.inc(1);
                 mesh.map_err(|trouble| (self.name)(drawing.layer().sheets[0].face, trouble))
             })
             .collect::<Result<_>>()?;
