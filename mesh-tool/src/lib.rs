@@ -27,6 +27,7 @@ pub mod build;
 pub mod clean;
 pub mod cluster;
 pub mod compare;
+pub mod compare_materials;
 pub mod conform;
 pub mod contact;
 pub mod convex;
