@@ -110,6 +110,8 @@ fn other_ways_to_write_the_same_are_read() {
         assert!(differs <= most, "{name}: {differs:e}");
     };
     same("plain.csv", lines(factor).as_bytes(), 0.0);
+    same("blanks.txt", lines(factor).replace(',', "  ").as_bytes(), 0.0);
+    same("semicolons.csv", lines(factor).replace(',', ";").as_bytes(), 0.0);
     let mut symmetric = "%%MatrixMarket matrix coordinate real symmetric\n% note\n6 6 15\n".to_owned();
     (1..6).for_each(|i| (0..i).for_each(|j| symmetric += &format!("{} {} {}\n", i + 1, j + 1, factor(i, j))));
     same("s.mtx", symmetric.as_bytes(), 0.0);

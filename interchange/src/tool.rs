@@ -4,10 +4,18 @@
 
 pub mod pages;
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+pub use indicatif::ProgressBar;
+use indicatif::{ProgressDrawTarget, ProgressFinish, ProgressStyle};
 use std::fmt::Display;
 use std::io::IsTerminal;
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Steps of a bar that [`show_fall`] moves.
+pub const STEPS_OF_FALL: usize = 1000;
+
+/// Whether bars are drawn: not before [`Common::start`], so that nothing but a program draws any.
+static SHOWS_PROGRESS: AtomicBool = AtomicBool::new(false);
 
 /// Line at the end of each tool's `--help`.
 pub const EXIT_CODES: &str =
@@ -55,6 +63,7 @@ impl Common {
     /// Sets up talk on stderr, the thread pool and what happens on Ctrl-C; to be called once, first.
     pub fn start(&self) {
         crate::interrupt::clear_up_when_interrupted();
+        SHOWS_PROGRESS.store(!self.quiet && std::io::stderr().is_terminal(), Ordering::Relaxed);
         let level = match (self.quiet, self.verbose) {
             (true, _) => tracing::Level::ERROR,
             (_, true) => tracing::Level::DEBUG,
@@ -68,14 +77,29 @@ impl Common {
         let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
     }
 
-    /// A bar for `steps` of work on a terminal, nothing elsewhere or with `--quiet`.
+    /// As [`progress`]; nothing with `--quiet`.
     pub fn progress(&self, title: &'static str, steps: usize) -> ProgressBar {
-        if self.quiet || !std::io::stderr().is_terminal() {
-            return ProgressBar::hidden();
-        }
-        let bar = ProgressBar::with_draw_target(Some(steps as u64), ProgressDrawTarget::stderr());
-        let style = ProgressStyle::with_template("{prefix} [{wide_bar}] {percent} % {eta}");
-        bar.with_prefix(title).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+        if self.quiet { ProgressBar::hidden() } else { progress(title, steps) }
+    }
+}
+
+/// A bar for `steps` of work with the time left, on a terminal; nothing elsewhere or with `--quiet`. It goes when dropped.
+pub fn progress(title: &'static str, steps: usize) -> ProgressBar {
+    if !SHOWS_PROGRESS.load(Ordering::Relaxed) {
+        return ProgressBar::hidden();
+    }
+    let bar = ProgressBar::with_draw_target(Some(steps as u64), ProgressDrawTarget::stderr());
+    let style = ProgressStyle::with_template("{prefix} [{wide_bar}] {percent} % {eta} left");
+    let bar = bar.with_prefix(title).with_finish(ProgressFinish::AndClear);
+    bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+/// Shows how far an iteration is that lowers `measure` from `first` to `last` by about the same factor in each step. The bar
+/// has [`STEPS_OF_FALL`] steps.
+pub fn show_fall(bar: &ProgressBar, first: f64, measure: f64, last: f64) {
+    let part = (first / measure).ln() / (first / last).ln();
+    if part.is_finite() {
+        bar.set_position((part.clamp(0.0, 1.0) * STEPS_OF_FALL as f64) as u64);
     }
 }
 

@@ -8,6 +8,7 @@ use geometry::gather::Scratch;
 use geometry::polygon;
 use glam::DVec3;
 use interchange::report::Report;
+use interchange::tool::{STEPS_OF_FALL, progress, show_fall};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -72,6 +73,7 @@ pub fn refine(
 ) -> Result<f64, (usize, Trouble)> {
     let mut known: HashMap<Key, Samples> = HashMap::new();
     let (mut added, mut divided, mut rounds) = (ADDED, 0, 0);
+    let (bar, mut first_worst) = (progress("elements", STEPS_OF_FALL), None);
     let mut worst;
     let mut given_up: std::collections::HashSet<Key> = std::collections::HashSet::new();
     loop {
@@ -100,6 +102,7 @@ pub fn refine(
         let mean = if power > 0.0 { squares / power } else { 1.0 };
         let errors: Vec<Missed> = samples.iter().map(|s| missed(s, wish.linear)).collect();
         worst = errors.iter().map(|missed| missed.most / mean).fold(0.0, f64::max);
+        show_fall(&bar, *first_worst.get_or_insert(worst), worst, wish.tolerance);
         let room = wish.most - corners.len() as f64;
         let mut order: Vec<usize> = (0..errors.len())
             .filter(|&k| errors[k].most / mean > wish.tolerance && !given_up.contains(&key(&corners[k])))

@@ -30,6 +30,7 @@ use interchange::provenance::Provenance;
 use interchange::report::Report;
 use interchange::scene::Scene;
 use interchange::tables::number;
+use interchange::tool::progress;
 use interchange::{Error, Result};
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashSet};
@@ -285,7 +286,9 @@ fn drawings_of(
     name: &(impl Fn(u32, Trouble) -> Error + Sync),
 ) -> Result<Vec<Drawing>> {
     let same_plane = |a: &Layer, b: &Layer| a.reversed != b.reversed && a.frame.plane == b.frame.plane;
+    let bar = progress("lines on planes", layers.len());
     let draw = |k: usize| {
+        bar.inc(1);
         let layer = &layers[k];
         let beside = [k.checked_sub(1), Some(k + 1)].into_iter().flatten().filter_map(|k| layers.get(k));
         let opposite = beside.into_iter().find(|other| same_plane(other, layer));

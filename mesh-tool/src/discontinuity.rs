@@ -15,8 +15,13 @@ use crate::wedge::{Piece, Surroundings, Trace, Wedge};
 use geometry::plane::Plane;
 use glam::DVec3;
 use interchange::report::Report;
+use interchange::tool::progress;
 use rayon::prelude::*;
 use robust::{Coord3D, orient3d};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Steps of the bar that an emitter stands for.
+const STEPS_PER_EMITTER: usize = 1000;
 
 /// Highest order of the lines that are wished.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
@@ -98,7 +103,9 @@ impl Drawing<'_> {
 
         let (mut lines, mut wedges, mut spared) = (Vec::new(), 0, 0);
         let (mut empty, mut faint, mut pairs) = (0, 0, 0);
-        for ((emitter, shafts), weak) in emitters.iter().zip(&shafts).zip(&weak) {
+        let bar = progress("lines", emitters.len() * STEPS_PER_EMITTER);
+        for (number, ((emitter, shafts), weak)) in emitters.iter().zip(&shafts).zip(&weak).enumerate() {
+            bar.set_position((number * STEPS_PER_EMITTER) as u64);
             let wanted = |face: u32| {
                 (shafts.holds_blocker(face) || !skips.leaves(Skip::Shaft))
                     && (!weak[face as usize] || !skips.leaves(Skip::Weak))
@@ -114,10 +121,13 @@ impl Drawing<'_> {
             let (cast, left_out) = self.wedges(emitter, &features, &surroundings);
             wedges += cast.len();
             spared += left_out;
+            let (count, swept) = (cast.len(), AtomicUsize::new(0));
             let traces: Vec<Vec<(Trace, u32)>> = cast
                 .par_iter()
                 .map(|cast| {
                     let traces = cast.wedge.sweep(&surroundings, cast.range, &cast.own);
+                    let part = swept.fetch_add(1, Ordering::Relaxed) * STEPS_PER_EMITTER / count;
+                    bar.set_position((number * STEPS_PER_EMITTER + part) as u64);
                     traces.into_iter().map(|trace| (trace, cast.order)).collect()
                 })
                 .collect();

@@ -17,11 +17,7 @@ use std::path::Path;
 
 /// Describes the file at `path`.
 pub fn describe(path: &Path, as_json: bool) -> Result<String> {
-    // The magic tells the kind; whatever is neither is refused by the mesh reader, which names what it found.
-    let mut magic = [0; 4];
-    let is_table = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok()
-        && &magic[1..] == b"MAT";
-    if is_table {
+    if is_material_table(path) {
         let (table, provenance, digest) = MaterialTable::read(path)?;
         Ok(if as_json {
             materials_json(&table, &provenance, digest)
@@ -36,6 +32,14 @@ pub fn describe(path: &Path, as_json: bool) -> Result<String> {
             mesh_page(path, &mesh, &provenance, digest)
         })
     }
+}
+
+/// Whether a file is a material table, by its magic; whatever is neither that nor a mesh is refused by the mesh reader, which
+/// names what it found.
+pub fn is_material_table(path: &Path) -> bool {
+    let mut magic = [0; 4];
+    std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut magic)).is_ok()
+        && &magic[1..] == b"MAT"
 }
 
 /// Elements, area and material of one group.

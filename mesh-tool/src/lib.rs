@@ -29,6 +29,7 @@ pub mod chosen;
 pub mod clean;
 pub mod cluster;
 pub mod compare;
+pub mod compare_materials;
 pub mod conform;
 pub mod contact;
 pub mod convex;

@@ -11,6 +11,7 @@ use geometry::gather::Scratch;
 use geometry::polygon;
 use glam::DVec3;
 use interchange::report::Report;
+use interchange::tool::{STEPS_OF_FALL, progress, show_fall};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -52,6 +53,7 @@ pub fn refine(
 ) -> Result<(), (usize, Trouble)> {
     let mut known: HashMap<Key, Irradiance> = HashMap::new();
     let (mut refined, mut points, mut before, mut rounds) = (0, 0, None, 0);
+    let (bar, mut first_room) = (progress("elements", STEPS_OF_FALL), None);
     let mut added = ADDED;
     let mut after;
     let mut blocked: std::collections::HashSet<Key> = std::collections::HashSet::new();
@@ -87,6 +89,7 @@ pub fn refine(
         after = deviation.sum::<f64>() / (whole * mean).max(f64::MIN_POSITIVE);
         before.get_or_insert(after);
         let room = wanted - triangles.len() as f64;
+        show_fall(&bar, *first_room.get_or_insert(room), room, (1.0 - ENOUGH) * wanted);
         if room <= (1.0 - ENOUGH) * wanted || rounds == ROUNDS {
             break;
         }

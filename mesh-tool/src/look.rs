@@ -86,6 +86,9 @@ fn group(path: &Path, mesh: &Mesh, name: &str, as_json: bool) -> Result<String> 
     let areas = elements.iter().map(|&e| polygon::area(&mesh.element_corners(ElementId(e - 1))));
     let (mut least, mut largest, mut total) = (f64::INFINITY, 0.0f64, 0.0);
     areas.for_each(|area| (least, largest, total) = (least.min(area), largest.max(area), total + area));
+    let in_group = |&(&of, _): &(&GroupId, &f64)| of == GroupId(number as u32);
+    let hidden: f64 =
+        mesh.face_groups.iter().zip(&mesh.hidden_areas).filter(in_group).map(|(_, area)| area).sum();
     let mut materials: Vec<&str> = elements
         .iter()
         .map(|&e| mesh.materials[mesh.element_material(ElementId(e - 1)).index()].as_str())
@@ -97,7 +100,7 @@ fn group(path: &Path, mesh: &Mesh, name: &str, as_json: bool) -> Result<String> 
     faces.dedup();
     if as_json {
         let data = json!({
-            "kind": "group", "group": name, "elements": elements, "faces": faces, "materials": materials, "area": total,
+            "kind": "group", "group": name, "elements": elements, "faces": faces, "materials": materials, "area": total, "hidden_area": hidden,
             "smallest_element": least.is_finite().then_some(least), "largest_element": largest,
         });
         return Ok(format!("{data:#}\n"));
@@ -106,6 +109,12 @@ fn group(path: &Path, mesh: &Mesh, name: &str, as_json: bool) -> Result<String> 
     if !elements.is_empty() {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "area       {total:.6e}, elements from {least:.6e} to {largest:.6e}");
+        if hidden > 0.0 {
+            let _ = writeln!(
+                text,
+                "hidden     {hidden:.6e} besides, dark and without elements; part of the group in means"
+            );
+        }
         let _ = writeln!(text, "materials  {}", materials.join(", "));
     }
     Ok(text)

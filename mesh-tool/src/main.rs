@@ -11,7 +11,7 @@ use mesh_tool::discontinuity::Order;
 use mesh_tool::look::{self, Look};
 use mesh_tool::solved::Solved;
 use mesh_tool::steps::{Off, Skip, Step};
-use mesh_tool::{NAME, Options, VERSION, compare, depfile, export, info, picture};
+use mesh_tool::{NAME, Options, VERSION, compare, compare_materials, depfile, export, info, picture};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -88,16 +88,17 @@ enum Command {
         #[arg(short, long, value_name = "FILE")]
         output: PathBuf,
     },
-    /// Show by how much two meshes differ
+    /// Show by how much two meshes or two material tables differ
     Compare {
-        /// Mesh (.mesh)
+        /// Mesh (.mesh) or material table (.materials)
         first: PathBuf,
-        /// Mesh to compare it with
+        /// What to compare it with
         second: PathBuf,
         /// As JSON, for scripts
         #[arg(long)]
         json: bool,
-        /// Fail (exit 1) where more than this part of the area is in elements that only one has
+        /// Fail (exit 1) where more than this part of the area is in elements that only one has, or where a value of a material
+        /// differs by more
         #[arg(long, value_name = "E", value_parser = tool::not_negative)]
         max: Option<f64>,
     },
@@ -259,6 +260,12 @@ fn run(line: &CommandLine) -> anyhow::Result<Finish> {
             }
         }
         Command::Compare { first, second, json, max } => {
+            if info::is_material_table(first) {
+                let difference = compare_materials::Difference::between(first, second)?;
+                tool::print_data(&difference.describe(*json))?;
+                difference.check(*max)?;
+                return Ok(Finish::Done);
+            }
             let difference = compare::Difference::between(first, second)?;
             tool::print_data(&difference.describe(*json))?;
             difference.check(*max)?;

@@ -5,6 +5,7 @@ use crate::meshed::{Drawing, Triangles};
 use crate::places::Places;
 use crate::triangulation::Trouble;
 use interchange::scene::Scene;
+use interchange::tool::progress;
 use interchange::{Error, Result};
 use rayon::prelude::*;
 
@@ -66,11 +67,13 @@ impl<Name: Fn(u32, Trouble) -> Error + Sync> Search<'_, Name> {
             Floor::Part(part) => part,
             Floor::Length(length) => length / spacing,
         };
+        let bar = progress("planes", self.drawings.len());
         let mut meshes: Vec<Triangles> = self
             .drawings
             .par_iter()
             .map(|drawing| {
                 let mesh = drawing.mesh(spacing, self.max_edge, floor);
+                bar.inc(1);
                 mesh.map_err(|trouble| (self.name)(drawing.layer().sheets[0].face, trouble))
             })
             .collect::<Result<_>>()?;

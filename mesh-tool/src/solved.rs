@@ -13,6 +13,7 @@ use interchange::ids::FaceId;
 use interchange::mesh::Mesh;
 use interchange::report::Report;
 use interchange::solution::Solution;
+use interchange::tool::progress;
 use interchange::{Error, Result};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -113,9 +114,11 @@ impl Solved {
         let whole: f64 = areas.iter().sum();
         let level = (0..areas.len()).map(|e| areas[e] * irradiance(e)).sum::<f64>() / whole;
         let gatherer = self.gatherer();
+        let bar = progress("test points", triangles.len());
         let errors: Vec<f64> = triangles
             .par_iter()
             .map_init(Scratch::default, |scratch, &(layer, _, corners, element)| {
+                bar.inc(1);
                 let normal = drawings[layer].normal();
                 let centre = polygon::mean_corner(&corners);
                 let mut gathered = |point: DVec3| {

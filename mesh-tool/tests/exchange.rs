@@ -98,6 +98,15 @@ fn every_format_is_written_and_others_are_refused() {
 }
 
 #[test]
+fn material_tables_are_compared_too() {
+    let folder = cube(None);
+    let folder = folder.path();
+    let same = json(folder, &["compare", "s.materials", "s.materials", "--max", "0"]);
+    assert_eq!(same["values_that_differ"], serde_json::json!([]));
+    tool(folder).args(["compare", "s.materials", "s.mesh"]).assert().code(1);
+}
+
+#[test]
 fn meshes_are_compared_by_what_they_share() {
     let folder = cube(Some("100"));
     let folder = folder.path();

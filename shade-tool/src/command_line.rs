@@ -5,7 +5,7 @@ use crate::compare::Difference;
 use crate::error::Result;
 use crate::exr_file::{self, Fit, Label, Precision};
 use crate::facets::Drawn;
-use crate::flag_values::{Interpolation, angle, ends_in, ends_in_either, film, size, vector};
+use crate::flag_values::{Interpolation, angle, ends_in, film, size, table, vector};
 use crate::frames::{Frame, frames};
 use crate::judge::Scheme;
 use crate::layers::Layer;
@@ -23,7 +23,7 @@ use crate::{TOOL, VERSION, bounces, grid, info, points, probe, skips};
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use glam::DVec3;
-use interchange::atomic_write::refuse_input;
+use interchange::atomic_write::{is_stdout, refuse_input};
 use interchange::provenance::Provenance;
 use interchange::report::Report;
 use interchange::scene::Settings;
@@ -198,8 +198,8 @@ pub struct ProbeArguments {
     /// Add the column H_error, the estimated error at each point (a grid has it always)
     #[arg(long)]
     pub errors: bool,
-    /// Table to write: the points, then H_r,H_g,H_b
-    #[arg(short, long, value_name = "OUT.CSV|NPY", value_parser = ends_in_either(["csv", "npy"]))]
+    /// Table to write: the points, then H_r,H_g,H_b; `-` for standard output
+    #[arg(short, long, value_name = "OUT.CSV|NPY", value_parser = table(["csv", "npy"]))]
     pub output: PathBuf,
 }
 
@@ -442,8 +442,13 @@ fn run_probe(arguments: &ProbeArguments, common: &Common) -> Result<()> {
         ] {
             report.estimate(name, value);
         }
-        print_data(&summary.text(arguments.efficacy))
-            .map_err(|e| interchange::Error::io(Path::new("stdout"), "write", e))?;
+        // Where the table goes to standard output, the summary is talk.
+        if !is_stdout(output) {
+            print_data(&summary.text(arguments.efficacy))
+                .map_err(|e| interchange::Error::io(Path::new("stdout"), "write", e))?;
+        } else if !common.quiet {
+            eprint!("{}", summary.text(arguments.efficacy));
+        }
     }
     report.write_beside(output)?;
     Ok(())

@@ -3,8 +3,9 @@
 use crate::judge::Scheme;
 use clap::ValueEnum;
 use glam::DVec3;
+use interchange::atomic_write::is_stdout;
 use interchange::tool::positive;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Largest picture side: 2^16 pixels, beyond any display or print.
 const LARGEST_SIDE: u32 = 1 << 16;
@@ -57,9 +58,13 @@ pub fn ends_in(ending: &'static str) -> impl Fn(&str) -> Result<PathBuf, String>
     }
 }
 
-/// The name of a file with one of two endings.
-pub fn ends_in_either(endings: [&'static str; 2]) -> impl Fn(&str) -> Result<PathBuf, String> + Clone {
+/// The name of a table: one of two endings, or `-` for standard output.
+pub fn table(endings: [&'static str; 2]) -> impl Fn(&str) -> Result<PathBuf, String> + Clone {
     move |text| {
+        let path = Path::new(text);
+        if is_stdout(path) {
+            return Ok(path.into());
+        }
         let fits = endings.iter().find_map(|ending| ends_in(ending)(text).ok());
         fits.ok_or_else(|| format!("the name must end in .{} or .{}", endings[0], endings[1]))
     }

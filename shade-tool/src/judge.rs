@@ -7,6 +7,7 @@ use crate::piece::Piece;
 use crate::receiver::Receiver;
 use glam::DVec2;
 use interchange::ids::ElementId;
+use interchange::tool::ProgressBar;
 
 /// How irradiance is interpolated over a facet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -56,15 +57,16 @@ pub(crate) struct Judge<'a> {
     pub other: Other<'a>,
     /// Deviations of what is darker count relative to this.
     pub dark: f64,
-    /// Called after each gathered point.
-    pub done: &'a (dyn Fn() + Sync),
+    /// Grows by the points that are asked, and moves on with each.
+    pub bar: &'a ProgressBar,
 }
 
 impl Judge<'_> {
     /// At places of pieces that reflect.
     pub fn gathered<'p>(&self, places: impl Iterator<Item = (&'p Piece, [f64; 3])>) -> Vec<Irradiance> {
         let receivers: Vec<Receiver> = places.map(|(piece, weights)| piece.receiver(&weights)).collect();
-        self.nodes.light().part_at(self.goal.part, &receivers, self.done)
+        self.bar.inc_length(receivers.len() as u64);
+        self.nodes.light().part_at(self.goal.part, &receivers, || self.bar.inc(1))
     }
 
     /// Deviation of radiosity, largest channel, and whether it is above the tolerance.

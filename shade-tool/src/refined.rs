@@ -20,6 +20,7 @@ use crate::receiver::Receiver;
 use crate::visible::VisibleSurface;
 use glam::DVec2;
 use interchange::ids::ElementId;
+use interchange::tool::ProgressBar;
 use std::collections::{BTreeMap, HashMap};
 
 /// Cuts in a row; 2^8 is more than any picture's pixels across a facet that matter.
@@ -86,14 +87,14 @@ pub struct RefinedFacets {
 impl RefinedFacets {
     /// Cuts the triangular `facets` (each with its length in pixels), whose nodes are gathered, until no edge deviates
     /// by more than the tolerance or a triangle is short. `other` is the light that makes up the whole;
-    /// `done` is called after each gathered point.
+    /// `bar` grows by the points that are gathered, and moves on with each.
     pub fn new(
         nodes: &NodeRadiosity<'_>,
         surface: &VisibleSurface,
         facets: &[(ElementId, f64)],
         goal: Goal,
         other: Other<'_>,
-        done: impl Fn() + Sync,
+        bar: &ProgressBar,
     ) -> RefinedFacets {
         let mut refined = RefinedFacets {
             scheme: goal.scheme,
@@ -118,8 +119,7 @@ impl RefinedFacets {
                 refined.pieces.push(piece);
             }
         }
-        let judge =
-            Judge { nodes, goal, other, dark: DARK * refined.mean_radiosity(nodes, other), done: &done };
+        let judge = Judge { nodes, goal, other, dark: DARK * refined.mean_radiosity(nodes, other), bar };
         for depth in 0..=DEEPEST {
             // What was cut and is not asked again stays doubtful.
             let small = |pixels: f64| pixels <= goal.pixels || depth == DEEPEST;
@@ -415,7 +415,10 @@ mod tests {
         let facets = floor.map(|element| (element, 1e6));
         let places = floor.map(|e| <[DVec2; 3]>::try_from(surface.corners(e)).unwrap()).to_vec();
         let goal = goal(scheme, tolerance);
-        (RefinedFacets::new(&nodes, &surface, &facets, goal, &|_, _| [0.0; 3], || {}), places)
+        (
+            RefinedFacets::new(&nodes, &surface, &facets, goal, &|_, _| [0.0; 3], &ProgressBar::hidden()),
+            places,
+        )
     }
 
     #[test]

@@ -8,6 +8,7 @@ use crate::visible::VisibleSurface;
 use glam::DVec2;
 use interchange::ids::ElementId;
 use interchange::report::Report;
+use interchange::tool::progress;
 use std::collections::HashMap;
 
 /// Facets of the size of a pixel are not asked for shadows of lamps.
@@ -37,7 +38,6 @@ impl RefinedParts {
         surface: &VisibleSurface,
         facets: &[(ElementId, f64)],
         (scheme, tolerance): (Scheme, f64),
-        done: impl Fn() + Sync + Copy,
         report: &mut Report,
     ) -> RefinedParts {
         // Each is judged as a part of the whole. Direct light comes first, with the mean of the indirect over the facet.
@@ -53,7 +53,8 @@ impl RefinedParts {
         let goal =
             Goal { part: Part::Direct, scheme, proof: Proof::Quarters, tolerance, pixels: DIRECT_PIXELS };
         let direct = report.phase("direct light in between", || {
-            RefinedFacets::new(nodes, surface, facets, goal, &other, done)
+            let bar = progress("direct light in between", 0);
+            RefinedFacets::new(nodes, surface, facets, goal, &other, &bar)
         });
         let other = |element, place: DVec2| {
             direct.at(element, place, &mut Vec::new()).map_or([0.0; 3], |found| found.irradiance)
@@ -66,7 +67,8 @@ impl RefinedParts {
             ..goal
         };
         let indirect = report.phase("indirect light in between", || {
-            RefinedFacets::new(nodes, surface, facets, goal, &other, done)
+            let bar = progress("indirect light in between", 0);
+            RefinedFacets::new(nodes, surface, facets, goal, &other, &bar)
         });
         RefinedParts { direct, indirect }
     }

@@ -20,7 +20,7 @@ use geometry::polygon;
 use geometry::source_tree::Opening;
 use interchange::ids::ElementId;
 use interchange::report::{Phase, Report};
-use interchange::tool::Common;
+use interchange::tool::{Common, ProgressBar};
 use rayon::prelude::*;
 use std::f64::consts::FRAC_1_PI;
 use std::ops::Range;
@@ -98,17 +98,22 @@ impl<'a> Renderer<'a> {
         let bands: Vec<Range<usize>> =
             (0..height).step_by(rows_per_band).map(|top| top..(top + rows_per_band).min(height)).collect();
         let surface = &self.surface;
-        let look = |band: &Range<usize>| -> Vec<Seen> {
+        let look = |band: &Range<usize>, bar: &ProgressBar| -> Vec<Seen> {
             let rows = band.clone().into_par_iter();
-            rows.flat_map_iter(|row| samples_of_row(surface, camera, row, samples)).collect()
+            let of_row = |row| {
+                bar.inc(1);
+                samples_of_row(surface, camera, row, samples)
+            };
+            rows.flat_map_iter(of_row).collect()
         };
 
         // Find what every sample sees, and so how many samples every facet has; a single band is kept for later.
         let mut kept = None;
         let mut extents = vec![Extent::default(); self.scene.mesh.element_count()];
         report.phase("visible surface", || {
+            let bar = common.progress("visible surface", height);
             for band in &bands {
-                let seen = look(band);
+                let seen = look(band, &bar);
                 extend(&mut extents, &seen, per_pixel, (width, band.start));
                 kept = (bands.len() == 1).then_some(seen);
             }
@@ -117,21 +122,14 @@ impl<'a> Renderer<'a> {
         // Gather at the nodes of the facets that are seen, and in between where interpolation does not serve.
         let elements: Vec<ElementId> =
             (0..extents.len()).filter(|&k| extents[k].is_seen()).map(ElementId::new).collect();
-        let bar = common.progress("render", height);
         let refined = quality.scheme.map(|scheme| {
             report.phase("gather at nodes", || {
+                let bar = common.progress("gather at nodes", 0);
                 self.nodes.gather(&elements, |points| bar.inc_length(points as u64), || bar.inc(1));
             });
             let facets: Vec<(ElementId, f64)> =
                 elements.iter().map(|&e| (e, extents[e.index()].pixels())).collect();
-            RefinedParts::new(
-                &self.nodes,
-                surface,
-                &facets,
-                (scheme, quality.tolerance),
-                || bar.tick(),
-                report,
-            )
+            RefinedParts::new(&self.nodes, surface, &facets, (scheme, quality.tolerance), report)
         });
 
         // Interpolate, and average over each pixel.
@@ -150,16 +148,19 @@ impl<'a> Renderer<'a> {
             gathered: &gathered,
         };
         let start = Instant::now();
+        let bar = common.progress("interpolation", width * height);
         for band in &bands {
-            let seen = kept.take().unwrap_or_else(|| look(band));
+            let seen = kept.take().unwrap_or_else(|| look(band, &ProgressBar::hidden()));
             count_unlit(&seen, report);
             let pixels: Vec<Pixel> = seen
                 .par_chunks(per_pixel)
-                .map_init(<(Vec<f64>, Scratch)>::default, |memory, seen| looks.pixel(seen, memory))
+                .map_init(<(Vec<f64>, Scratch)>::default, |memory, seen| {
+                    bar.inc(1);
+                    looks.pixel(seen, memory)
+                })
                 .collect();
             picture.pixels.extend(pixels.iter().map(|pixel| pixel.radiance));
             append_layers(&mut picture.layers, &layers, &pixels);
-            bar.inc(band.len() as u64);
         }
         report.phases.push(Phase { name: "interpolation".into(), seconds: start.elapsed().as_secs_f64() });
         bar.finish_and_clear();

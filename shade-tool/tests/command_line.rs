@@ -117,6 +117,8 @@ fn probe_adds_irradiance_to_the_points() {
         }
     }
     assert!(folder.path().join("out.csv.report.json").exists());
+    let shown = run(folder.path(), "probe s.sol --mesh s.mesh --points p.csv -o -");
+    assert_eq!((shown.status.code(), String::from_utf8_lossy(&shown.stdout).into_owned()), (Some(0), table));
 
     std::fs::write(folder.path().join("p.csv"), "x,y,z,nx,ny,nz\n").unwrap();
     assert!(run(folder.path(), "probe s.sol --mesh s.mesh --points p.csv -o out.csv").status.success());

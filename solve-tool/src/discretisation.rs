@@ -9,6 +9,7 @@ use geometry::plane::Plane;
 use geometry::quadrature::{Strength, polygon_rule};
 use glam::DVec3;
 use interchange::mesh::Mesh;
+use interchange::tool::progress;
 use rayon::prelude::*;
 
 /// Points of each element: four on a parallelogram, three on each triangle of others. The middle alone would miss that
@@ -66,10 +67,12 @@ pub fn residuals_at(
     of: Radiosities<'_>,
 ) -> Vec<ElementResidual> {
     let gatherer = Gatherer::new(occluders, elements.clone());
+    let bar = progress("test points", elements.len());
     elements
         .par_iter()
         .enumerate()
         .map_init(Scratch::default, |scratch, (i, corners)| {
+            bar.inc(1);
             let mut found = ElementResidual::default();
             let black = of.reflectance[i].iter().all(|&rho| rho == 0.0);
             let Some(plane) = Plane::of_polygon(corners).filter(|_| !black) else { return found };

@@ -4,6 +4,7 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 use interchange::foreign::Format;
 use interchange::grouping::By;
+use interchange::tables::TableFormat;
 use interchange::tool::{
     Common, EXIT_CODES, Finish, examples, exit_code, not_negative, pages, positive, print_data,
 };
@@ -229,6 +230,10 @@ fn run(command: Command) -> anyhow::Result<Finish> {
                     "--white goes with elements (.ply, .vtu, .glb, .obj, .rad)",
                 );
             }
+            TableFormat::of(&output, &[TableFormat::Csv, TableFormat::Npy]).map_err(|_| {
+                let message = "the name must end in .csv or .npy (tables), or in .ply, .vtu, .glb, .obj or .rad (elements)";
+                interchange::Error::whole(&output, message)
+            })?;
             let Some(by) = by else {
                 refuse(ErrorKind::MissingRequiredArgument, "a table needs --by element, face or group");
             };

@@ -3,6 +3,7 @@
 
 use crate::equation::{Equation, apply};
 use crate::product::Product;
+use interchange::tool::{ProgressBar, STEPS_OF_FALL, progress, show_fall};
 
 /// Fall of the measure that counts as progress.
 const PROGRESS: f64 = 0.01;
@@ -68,6 +69,9 @@ pub(crate) struct Work<'a> {
     pub observer: Option<&'a mut Observer<'a>>,
     tracks: Vec<Track>,
     steps: usize,
+    bar: ProgressBar,
+    /// Largest measure at the start.
+    first: Option<f64>,
 }
 
 /// A channel's progress.
@@ -101,6 +105,8 @@ impl<'a> Work<'a> {
             observer: None,
             tracks: Vec::new(),
             steps: 0,
+            bar: progress("solve", STEPS_OF_FALL),
+            first: None,
         }
     }
 
@@ -114,6 +120,7 @@ impl<'a> Work<'a> {
             Track { measure, best: measure, best_irradiance, progress: (step, measure), end }
         };
         self.tracks = self.equations.iter().enumerate().map(track).collect();
+        self.first = self.first.or(Some(self.largest()));
     }
 
     /// Channels that are not at their end.
@@ -181,8 +188,14 @@ impl<'a> Work<'a> {
         }
     }
 
+    /// The measure of the channel that is farthest from its end.
+    fn largest(&self) -> f64 {
+        self.tracks.iter().map(|track| track.best).fold(0.0, f64::max)
+    }
+
     /// Adds the measures to the history.
     pub fn note(&mut self) {
+        show_fall(&self.bar, self.first.unwrap_or(0.0), self.largest(), self.target);
         self.history.push(self.tracks.iter().map(|track| track.measure).collect());
     }
 

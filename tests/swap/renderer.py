@@ -28,7 +28,7 @@ def read_vtu(path):
     for part in xml.parse(path).getroot().iter():
         for array in part.findall("DataArray") if part.tag in ("Points", "Cells", "PointData", "CellData") else ():
             content = base64.b64decode(array.text)[8:]
-            columns = int(array.get("NumberOfComponents"))
+            columns = int(array.get("NumberOfComponents", 1))
             name = ("cell " if part.tag == "CellData" else "") + array.get("Name")
             values = np.frombuffer(content, TYPES[array.get("type")])
             found[name] = values.reshape(-1, columns) if columns > 1 else values

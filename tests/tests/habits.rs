@@ -55,6 +55,25 @@ fn manual_pages_and_completions_know_every_subcommand() {
 }
 
 #[test]
+fn bash_completes_flags_behind_subcommands() {
+    let folder = tests::folder();
+    let completed = |name: &str, words: &[&str]| {
+        run(tool(name).arg("pages").arg(folder.path())).expect_code(0);
+        // As bash calls it: the program, the word at the cursor, the word before.
+        let script = "source \"$1\"; shift; COMP_WORDS=(\"$@\"); COMP_CWORD=$(($# - 1)); \
+                      completer=$(complete -p \"$1\" | sed 's/.*-F \\([^ ]*\\).*/\\1/'); \
+                      $completer \"$1\" \"${COMP_WORDS[-1]}\" \"${COMP_WORDS[-2]}\"; echo \"${COMPREPLY[@]}\"";
+        let file = folder.path().join("share/bash-completion/completions").join(name);
+        let mut bash = std::process::Command::new("bash");
+        run(bash.args(["-c", script, "bash"]).arg(file).arg(name).args(words)).expect_code(0).stdout
+    };
+    assert_eq!(completed("solve-tool", &["solve", "--sol"]), "--solver\n");
+    assert_eq!(completed("solve-tool", &["solve", "--solver", "gau"]), "gauss-seidel\n");
+    assert_eq!(completed("formfactor-tool", &["import", "--rec"]), "--reciprocity\n");
+    assert_eq!(completed("shade-tool", &["view", "false-colour", "--ran"]), "--range\n");
+}
+
+#[test]
 fn a_dash_is_standard_output() {
     let folder = tests::folder();
     let chain =

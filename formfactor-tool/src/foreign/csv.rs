@@ -1,4 +1,5 @@
-//! Factors as comma-separated values: a header of names and a row per line, its name first; read also without either.
+//! Factors as comma-separated values: a header of names and a row per line, its name first; read also without either, and
+//! with blanks or semicolons between the numbers.
 
 use super::{RowSource, Table};
 use interchange::atomic_write::Outcome;
@@ -26,7 +27,23 @@ pub fn write(path: &Path, source: &dyn RowSource) -> Result<Outcome> {
 /// # Errors
 /// Lines of different lengths, a cell that is no number, a table that is not square.
 pub fn read(path: &Path, text: &str, expected: usize) -> Result<Table> {
-    let mut reader = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(text.as_bytes());
+    let blanks_only = text.lines().next().is_some_and(|first| !first.contains([',', ';']));
+    // One blank between numbers, as `numpy.savetxt` writes by default, or any number of them.
+    let spaced: String;
+    let text = if blanks_only {
+        spaced =
+            text.lines().map(|line| line.split_whitespace().collect::<Vec<_>>().join(",") + "\n").collect();
+        &spaced
+    } else {
+        text
+    };
+    let semicolons = text.lines().next().is_some_and(|first| first.contains(';') && !first.contains(','));
+    let delimiter = if semicolons { b';' } else { b',' };
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .delimiter(delimiter)
+        .from_reader(text.as_bytes());
     let mut lines = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|e| Error::whole(path, format!("not a CSV table: {e}")))?;

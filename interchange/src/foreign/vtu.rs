@@ -77,9 +77,12 @@ fn array(
 ) -> std::io::Result<()> {
     let mut block = (bytes.len() as u64).to_le_bytes().to_vec();
     block.extend_from_slice(bytes);
+    // As VTK writes it: some readers make a column of what is said to have one component.
+    let components =
+        if components == 1 { String::new() } else { format!(" NumberOfComponents=\"{components}\"") };
     writeln!(
         out,
-        "<DataArray type=\"{kind}\" Name=\"{}\" NumberOfComponents=\"{components}\" format=\"binary\">{}</DataArray>",
+        "<DataArray type=\"{kind}\" Name=\"{}\"{components} format=\"binary\">{}</DataArray>",
         safe(name),
         base64::encode(&block)
     )
@@ -107,14 +110,9 @@ mod tests {
         assert!(text.contains("NumberOfPoints=\"5\" NumberOfCells=\"2\""), "{text}");
         // Eight bytes of length (2), then the types 9 (quadrilateral) and 5 (triangle).
         let types = base64::encode(&[2, 0, 0, 0, 0, 0, 0, 0, 9, 5]);
-        assert!(
-            text.contains(&format!("Name=\"types\" NumberOfComponents=\"1\" format=\"binary\">{types}<"))
-        );
+        assert!(text.contains(&format!("Name=\"types\" format=\"binary\">{types}<")));
         let ends: Vec<u8> = [16i64, 4, 7].iter().flat_map(|n| n.to_le_bytes()).collect();
-        assert!(text.contains(&format!(
-            "Name=\"offsets\" NumberOfComponents=\"1\" format=\"binary\">{}<",
-            base64::encode(&ends)
-        )));
+        assert!(text.contains(&format!("Name=\"offsets\" format=\"binary\">{}<", base64::encode(&ends))));
         let mut b = 48u64.to_le_bytes().to_vec();
         b.extend([1.0f64, 2.0, 3.0, 0.1, 0.2, 0.3].iter().flat_map(|x| x.to_le_bytes()));
         assert!(text.contains(&format!(
