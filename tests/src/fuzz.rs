@@ -3,6 +3,8 @@
 
 use crate::damage::Dice;
 use formfactor_tool::foreign;
+use geometry::gather::{Gatherer, Scratch};
+use geometry::occluder::Occluder;
 use geometry::patch::Patch;
 use geometry::plane::Plane;
 use geometry::{polygon, unoccluded};
@@ -87,6 +89,52 @@ pub fn form_factor_invariants(bytes: &[u8]) {
         assert!(exchange.value <= p.area.min(q.area) + allowed, "{exchange:?} of {p:?} and {q:?}");
     }
     assert!((one.value - other.value).abs() <= allowed, "{one:?} and {other:?} of {p:?} and {q:?}");
+}
+
+/// Visible parts: 0 <= visible <= whole, a further blocker never lets more be seen, and their order does not matter.
+pub fn visible_parts(bytes: &[u8]) {
+    let mut bytes = bytes.iter().copied();
+    let (eye, target) = (point(&mut bytes), corners(&mut bytes));
+    let Some(normal) = point(&mut bytes).try_normalize() else { return };
+    if Patch::new(target.clone()).is_none() {
+        return;
+    }
+    let mut blockers = Vec::new();
+    for _ in 0..bytes.next().unwrap_or(0) % 4 {
+        blockers.extend(Occluder::new(corners(&mut bytes)));
+    }
+    // Closer than this to a blocker's plane, and not on it, either answer holds: contact is a matter of tolerance.
+    let size = blockers
+        .iter()
+        .flat_map(|b| &b.corners)
+        .chain(&target)
+        .map(|c| (*c - eye).length())
+        .fold(0.0, f64::max);
+    let doubtful = |b: &Occluder| b.plane.distance(eye) != 0.0 && b.plane.distance(eye).abs() < 1e-6 * size;
+    if blockers.iter().any(doubtful) {
+        return;
+    }
+    let seen = |blockers: &[Occluder]| {
+        let mut sum = 0.0;
+        let gatherer = Gatherer::new(blockers.to_vec(), vec![target.clone()]);
+        gatherer.factors(eye, normal, &mut Scratch::default(), &mut |_, factor| sum += factor);
+        sum
+    };
+    // Cuts are interpolated along edges: some ulp of angles, a thousandfold for flat ones.
+    const ROUNDING: f64 = 1e-12;
+    let mut before = seen(&[]);
+    assert!((0.0..=1.0 + ROUNDING).contains(&before), "{before} of {target:?} from {eye} {normal}");
+    for count in 1..=blockers.len() {
+        let now = seen(&blockers[..count]);
+        let said = || {
+            format!("{now} after {before} of {target:?} from {eye} {normal} past {:?}", &blockers[..count])
+        };
+        assert!(now >= 0.0 && now <= before + ROUNDING, "{}", said());
+        let turned: Vec<Occluder> = blockers[..count].iter().rev().cloned().collect();
+        let other = seen(&turned);
+        assert!((now - other).abs() <= ROUNDING, "in turned order {other}: {}", said());
+        before = now;
+    }
 }
 
 /// A good input changed at a few seeded places: bits flipped, bytes set, parts cut out, doubled or swapped for others.
