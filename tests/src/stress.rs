@@ -97,6 +97,56 @@ pub fn wedge(angle: f64) -> Vec<Surface> {
     ]
 }
 
+/// Two rectangles of width 1 and this length that share a long edge, with this angle between their fronts.
+pub fn plates(angle: f64, length: f64) -> Vec<Surface> {
+    let mut plates = wedge(angle);
+    plates.iter_mut().flat_map(|plate| &mut plate.corners).for_each(|corner| corner[1] *= length);
+    plates
+}
+
+/// Perpendicular unit squares, the second moved by `shift` along the edge they had in common.
+pub fn shifted(shift: f64) -> Vec<Surface> {
+    let mut squares = wedge(std::f64::consts::FRAC_PI_2);
+    squares[1].corners.iter_mut().for_each(|corner| corner[1] += shift);
+    squares
+}
+
+/// F between the squares of [`shifted`]. The exchange is the double integral of an even kernel of the distance along
+/// the edge, hence half the second difference of A F of perpendicular rectangles with a common edge.
+pub fn shifted_exchange(shift: f64) -> f64 {
+    (perpendicular(1.0 + shift) - 2.0 * perpendicular(shift) + perpendicular((1.0 - shift).abs())) / 2.0
+}
+
+/// A F between perpendicular rectangles of width 1 with a common edge of this length (Howell's catalogue, C-14).
+fn perpendicular(length: f64) -> f64 {
+    if length == 0.0 {
+        return 0.0;
+    }
+    let w = 1.0 / length;
+    let (square, both) = (w * w, 1.0 + 2.0 * w * w);
+    let root = w * std::f64::consts::SQRT_2;
+    let logarithm = 2.0 * (1.0 + square).ln() - both.ln()
+        + 2.0 * square * (square * both / ((1.0 + square) * 2.0 * square)).ln();
+    let sum = 2.0 * w * length.atan() - root * (1.0 / root).atan() + 0.25 * logarithm;
+    length * sum / (PI * w)
+}
+
+/// The unit cube from inside, each face cut into n by n cells whose edges grow with the cube of their number.
+pub fn graded_cube(n: usize) -> Vec<Surface> {
+    let at = |k: usize| (k as f64 / n as f64).powi(3);
+    let mut cells = Vec::new();
+    for side in crate::surfaces::room([1.0; 3]) {
+        let [a, b, d] = [0, 1, 3].map(|k| side.corners[k]);
+        let point = |u: f64, v: f64| [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (d[k] - a[k]));
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let (u, v) = ([at(i), at(i + 1)], [at(j), at(j + 1)]);
+            let corners = [point(u[0], v[0]), point(u[1], v[0]), point(u[1], v[1]), point(u[0], v[1])];
+            cells.push(Surface::new("cell", corners));
+        }
+    }
+    cells
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -112,5 +162,12 @@ mod tests {
         );
         // 1 - F is of the order of the gap; the rounding of the form itself is smaller still.
         assert!((1.0 - opposed(1.0, 1.0, 1e-12)).abs() < 1e-10);
+    }
+
+    #[test]
+    fn shifted_squares_tend_to_those_with_a_common_edge() {
+        // Hottel & Sarofim's perpendicular squares, 13 digits.
+        assert_close("no shift", shifted_exchange(0.0), 0.200_043_776_075_4, Tolerance::Abs(1e-13));
+        assert!(shifted_exchange(0.5) > shifted_exchange(1.0) && shifted_exchange(1.0) > 0.0);
     }
 }

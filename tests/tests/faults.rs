@@ -309,6 +309,14 @@ impl SmallDisk {
     }
 }
 
+impl SmallDisk {
+    /// Lets nobody write any more, root included; whether the system did.
+    fn protect(&self) -> bool {
+        let done = Command::new("mount").args(["-o", "remount,ro"]).arg(self.folder.path()).output();
+        done.is_ok_and(|done| done.status.success())
+    }
+}
+
 impl Drop for SmallDisk {
     fn drop(&mut self) {
         let _ = Command::new("umount").arg(self.folder.path()).output();
@@ -333,6 +341,61 @@ fn a_full_disk_leaves_the_old_file_and_says_so() {
         assert_eq!(bytes(&output), b"old", "{stage:?}");
         let left: Vec<String> = names(disk.folder.path());
         assert!(!left.iter().any(|name| name.ends_with(".partial")), "{left:?}");
+    }
+}
+
+/// A folder that may only be read: by its permissions where they bind, by the file system where we may mount one.
+#[cfg(unix)]
+#[test]
+fn a_read_only_folder_keeps_the_old_file_and_is_named() {
+    use std::os::unix::fs::PermissionsExt;
+    let (_folder, chain) = made(60);
+    let assert_kept = |stage: Stage, output: &Path, said: &str| {
+        let done = run(&mut chain.command_to(stage, output));
+        assert_refused(&done, ANY_OUTPUT.as_ref());
+        assert!(done.stderr.contains(said), "{stage:?}: {}", done.stderr);
+        assert_eq!(bytes(output), b"old", "{stage:?}");
+        assert_eq!(names(output.parent().unwrap()), [output.file_name().unwrap().to_str().unwrap()]);
+    };
+    let mut tested = 0;
+    for stage in Stage::ALL {
+        let closed = tests::folder();
+        let output = closed.path().join("s").with_extension(stage.output());
+        std::fs::write(&output, "old").unwrap();
+        let allow = |mode| {
+            std::fs::set_permissions(closed.path(), std::fs::Permissions::from_mode(mode)).unwrap();
+        };
+        allow(0o555);
+        // Root writes all the same.
+        if std::fs::write(closed.path().join("try"), "").is_err() {
+            assert_kept(stage, &output, "check the permissions");
+            tested += 1;
+        }
+        allow(0o755);
+
+        let Some(disk) = SmallDisk::mount(256) else { continue };
+        let output = disk.path("s").with_extension(stage.output());
+        std::fs::write(&output, "old").unwrap();
+        if disk.protect() {
+            assert_kept(stage, &output, "ead-only file system");
+            tested += 1;
+        }
+    }
+    if tested == 0 {
+        eprintln!("permissions do not bind and no right to mount: only a path below a file was tested");
+    }
+}
+
+/// A path below a file can be written by nobody, root included.
+#[test]
+fn an_output_below_a_file_is_refused_and_the_file_kept() {
+    let (folder, chain) = made(60);
+    let file = folder.path().join("file");
+    std::fs::write(&file, "old").unwrap();
+    for stage in Stage::ALL {
+        let done = run(&mut chain.command_to(stage, &file.join("s").with_extension(stage.output())));
+        assert_refused(&done, &file);
+        assert_eq!(bytes(&file), b"old", "{stage:?}");
     }
 }
 

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 use tests::chain::Chain;
 use tests::damage::Dice;
-use tests::fuzz::{READERS, changed, clipping, form_factor_invariants, reader};
+use tests::fuzz::{READERS, changed, clipping, form_factor_invariants, reader, visible_parts};
 use tests::{run, tool, two_squares};
 
 /// Inputs of each geometric body where no time is asked for.
@@ -91,6 +91,12 @@ fn clipping_keeps_its_promises() {
 #[test]
 fn form_factors_keep_their_invariants() {
     drive("form_factor_invariants", SHORT, noise, form_factor_invariants);
+}
+
+#[test]
+fn visible_parts_keep_their_promises() {
+    let long = |dice: &mut Dice| (0..16 + dice.below(112)).map(|_| dice.bits() as u8).collect();
+    drive("visible_parts", SHORT, long, visible_parts);
 }
 
 /// Blockers only take away: each factor with a screen in the room is at most the one without, and rows sum to 1 at most.

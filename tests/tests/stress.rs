@@ -5,7 +5,10 @@
 use tests::chain::{Chain, Stage};
 use tests::proof::boxes;
 use tests::proof::errors::{given, rms};
-use tests::stress::{Row, TOLERANCE, factors, opposed, opposed_faces, table, wedge};
+use tests::stress::{
+    Row, TOLERANCE, factors, graded_cube, opposed, opposed_faces, plates, shifted, shifted_exchange, table,
+    wedge,
+};
 use tests::surfaces::{Paint, Surface, room, write};
 use tests::table::Table;
 use tests::{run, tool};
@@ -32,10 +35,23 @@ fn gaps_and_strips() -> Vec<Row> {
         // Corners within 1e-9 of the diagonal (1.4e-9 here) are one corner: such faces touch, with no air between.
         let (want, limit, reason) = match power {
             ..=8 => (opposed(1.0, 1.0, gap), TOLERANCE, BOUND),
-            _ => (0.0, 0.0, "below the welding distance, 1e-9 of the diagonal: the faces touch, F = 0"),
+            _ => (
+                0.0,
+                0.0,
+                "below the welding distance, 1e-9 of the diagonal: the faces touch, F = 0 (README, Limitations)",
+            ),
         };
         let got = error(&opposed_faces(1.0, 1.0, gap), &[], &[], want);
         rows.push(Row::new(format!("opposed unit squares, gap 1e-{power}"), got, limit, reason));
+    }
+    // Neither welded nor taken for one plane: the air between the faces counts, however thin.
+    let apart = ["--no-skip", "same-plane", "--no-skip", "behind", "--no-skip", "behind-clusters"];
+    for power in 9..=12 {
+        let gap = 10f64.powi(-power);
+        let want = opposed(1.0, 1.0, gap);
+        let got = error(&opposed_faces(1.0, 1.0, gap), &["--no-clean", "weld"], &apart, want);
+        let case = format!("opposed unit squares, gap 1e-{power}, without weld and same-plane skips");
+        rows.push(Row::new(case, got, TOLERANCE, BOUND));
     }
     for power in 1..=7 {
         let width = 10f64.powi(-power);
@@ -43,6 +59,45 @@ fn gaps_and_strips() -> Vec<Row> {
         rows.push(Row::new(format!("strips of aspect 1e{power} at their width"), got, TOLERANCE, BOUND));
     }
     rows
+}
+
+/// Pairs that touch at a corner or along a part of an edge, long plates with a common edge, graded slivers.
+fn contacts() -> Vec<Row> {
+    let mut rows = Vec::new();
+    for (name, shift) in [("along half an edge", 0.5), ("at a corner", 1.0), ("along a thousandth", 0.999)] {
+        let got = error(&shifted(shift), &[], &[], shifted_exchange(shift));
+        rows.push(Row::new(format!("perpendicular squares that touch {name}"), got, TOLERANCE, BOUND));
+    }
+    let length = 1e5;
+    for (name, angle) in [("60 degrees", std::f64::consts::FRAC_PI_3), ("1e-3", 1e-3)] {
+        let got = error(&plates(angle, length), &[], &[], 1.0 - (angle / 2.0).sin());
+        let reason = "1 - sin(angle / 2) of endless plates; each end loses less than a width; the tolerance";
+        rows.push(Row::new(
+            format!("plates 1e5 long, {name} between them"),
+            got,
+            2.0 / length + TOLERANCE,
+            reason,
+        ));
+    }
+    let worst = graded_cube_error(&["--no-skip", "far-rules"]);
+    let case = "row sums of a cube of 600 cells graded to 1e-3 (slivers), without far rules";
+    // Where far rules are off, the contour of slivers that meet at a corner is to 2.3e-5, and says so (exit 3).
+    rows.push(Row::new(case, worst, 3e-5, "the error the matrix states for its worst row, 2.3e-5"));
+    rows
+}
+
+/// Largest distance of a row sum from 1 in a cube graded towards three of its edges.
+fn graded_cube_error(compute: &[&str]) -> f64 {
+    let off = |row: &Vec<f64>| (row.iter().sum::<f64>() - 1.0).abs();
+    factors(&graded_cube(10), &[], compute).map_or(f64::INFINITY, |f| f.iter().map(off).fold(0.0, f64::max))
+}
+
+/// The rules of few points state 2e-7 for slivers that meet end to end at a corner, and miss 5e-4 of a row.
+#[test]
+#[ignore = "known fault: far rules on slivers that meet at a corner"]
+fn slivers_end_to_end_around_an_edge_keep_the_tolerance() {
+    let worst = graded_cube_error(&[]);
+    assert!(worst <= TOLERANCE, "{worst}");
 }
 
 /// Edge-sharing squares from nearly closed to nearly flat.
@@ -120,6 +175,140 @@ fn furnaces() -> Vec<Row> {
     let quads = boxes::quads(0, 20).into_iter().map(|quad| Surface::new("q", quad)).collect();
     let got = furnace("emitters", quads, 0.5, "1e-3");
     rows.push(Row::new("2400 emitters", got, 2e-3, "row errors times 1 / (1 - rho)"));
+    rows
+}
+
+/// A room of faces that reflect `rho` and emit `1 - rho` each: B = 1 whatever the reflectances are.
+fn grey_room(folder: &std::path::Path, rho: [f64; 6], matrix: &[&str], solve: &[&str]) -> Chain {
+    let sides = room([1.0, 2.0, 3.0]).into_iter().zip(rho);
+    let surfaces: Vec<Surface> = sides.map(|(side, rho)| side.painted(Paint::grey(rho, 1.0 - rho))).collect();
+    let mut chain = Chain::as_given(write(folder, &surfaces), folder);
+    chain.mesh_flags = ["--max-edge", "0.5"].map(str::to_owned).to_vec();
+    chain.matrix_flags = matrix.iter().map(|&flag| flag.to_owned()).collect();
+    chain.solve_flags = solve.iter().map(|&flag| flag.to_owned()).collect();
+    chain
+}
+
+/// Largest and mean error of B against 1, and the exit code of the solver; infinite where a stage fails.
+fn grey_error(chain: &Chain) -> (f64, f64, Option<i32>) {
+    let mut code = None;
+    for stage in [Stage::Build, Stage::Compute, Stage::Solve] {
+        let done = run(&mut chain.command(stage));
+        code = done.code;
+        if !matches!(done.code, Some(0 | 3)) {
+            eprintln!("stress: {stage:?}: {}", done.stderr);
+            return (f64::INFINITY, f64::INFINITY, code);
+        }
+    }
+    let table = chain.radiosities("element");
+    let errors: Vec<f64> = (0..table.rows.len()).map(|row| (table.number(row, "B_r") - 1.0).abs()).collect();
+    let mean = errors.iter().sum::<f64>() / errors.len().max(1) as f64;
+    (errors.into_iter().fold(0.0, f64::max), mean, code)
+}
+
+/// Guards of the solvers, short numbers, files between stages, threads.
+fn solvers_and_files() -> Vec<Row> {
+    const MIXED: [f64; 6] = [0.0, 0.3, 0.6, 0.9, 0.99, 0.5];
+    const MATRIX: [&str; 4] = ["--tolerance", "1e-6", "--precision", "f64"];
+    let mut rows = Vec::new();
+    for solver in ["cg", "jacobi", "gauss-seidel", "southwell", "direct", "gmres"] {
+        let folder = tests::folder();
+        let chain = grey_room(folder.path(), MIXED, &MATRIX, &["--solver", solver, "--tolerance", "1e-8"]);
+        let (worst, _, _) = grey_error(&chain);
+        let reason =
+            "B = 1 exactly; the largest of 88 elements for a mean of 1e-8, emitters of 1e-2 among them";
+        rows.push(Row::new(format!("{solver}, one side black, others to 0.99"), worst, 1e-5, reason));
+    }
+    let folder = tests::folder();
+    let capped = grey_room(folder.path(), [0.9; 6], &MATRIX, &["--solver", "jacobi", "--max-steps", "3"]);
+    let (_, mean, code) = grey_error(&capped);
+    let bound = if code == Some(3) { capped.reported("sol", "estimates", "solver bound") } else { f64::NAN };
+    // The elements are squares of one size; the bound is relative to the emitted power, 0.1 of an area.
+    let above = (mean / 0.1 - bound).max(0.0);
+    let above = if bound.is_nan() { f64::INFINITY } else { above };
+    let reason = "exit 3, and the error is within the bound it states; 1e-6 in the rows times 1 / (1 - rho)";
+    rows.push(Row::new("Jacobi stopped after 3 steps: error above its bound", above, 1e-5, reason));
+    let folder = tests::folder();
+    let (worst, _, code) =
+        grey_error(&grey_room(folder.path(), [0.9; 6], &MATRIX, &["--solver", "cg", "--tolerance", "1e-30"]));
+    let worst = if code == Some(3) { worst } else { f64::INFINITY };
+    rows.push(Row::new(
+        "cg asked for 1e-30: ends with exit 3",
+        worst,
+        1e-12,
+        "64 ulp of a row times 1 / (1 - rho), 5 times",
+    ));
+    let folder = tests::folder();
+    let short = ["--tolerance", "1e-6", "--precision", "f32"];
+    let (worst, _, _) = grey_error(&grey_room(folder.path(), [0.99; 6], &short, &["--tolerance", "1e-8"]));
+    rows.push(Row::new(
+        "f32 entries, reflectance 0.99",
+        worst,
+        6e-6,
+        "half an f32 ulp, 6e-8, of a row summed in f64, times 1 / (1 - rho)",
+    ));
+    rows.extend(files());
+    rows
+}
+
+/// Files between the stages: what comes back is what was written, and nothing else is taken for it.
+fn files() -> Vec<Row> {
+    let mut rows = Vec::new();
+    let folder = tests::folder();
+    let matrix = ["--tolerance", "1e-4", "--precision", "f64"];
+    let chain = grey_room(folder.path(), [0.5; 6], &matrix, &["--tolerance", "1e-2"]);
+    chain.solve();
+    let yes = |wrong: bool| f64::from(u8::from(wrong));
+    for ending in ["npz", "mtx", "csv"] {
+        let (table, again) = (folder.path().join("x").with_extension(ending), folder.path().join("again.ff"));
+        let mesh = chain.path("mesh");
+        let mut export = tool("formfactor-tool");
+        export.arg("export").arg(chain.path("ff")).arg("--mesh").arg(&mesh).args(["--by", "element", "-o"]);
+        let out = run(export.arg(&table));
+        let mut import = tool("formfactor-tool");
+        import.arg("import").arg(&table).arg("--mesh").arg(&mesh).arg("-o").arg(&again);
+        let back = run(import.args(["--tolerance", "1e-3"]));
+        let mut compare = tool("formfactor-tool");
+        let same = run(compare.arg("compare").arg(chain.path("ff")).arg(&again).args(["--max", "1e-14"]));
+        let wrong = [out, back, same].into_iter().find(|done| done.code != Some(0));
+        wrong.iter().for_each(|done| eprintln!("stress: {ending}: {}", done.stderr));
+        let reason = "no difference above 1e-14: 17 digits, or the bits";
+        rows.push(Row::new(
+            format!("matrix out to {ending} and in again: differs"),
+            yes(wrong.is_some()),
+            0.0,
+            reason,
+        ));
+    }
+    let (good, mut taken) = (tests::bytes(&chain.path("ff")), 0);
+    for (_, bad) in tests::damage::flips(&good, 32, 14) {
+        std::fs::write(chain.path("ff"), bad).unwrap();
+        taken += usize::from(matches!(
+            run(&mut chain.command_to(Stage::Solve, &folder.path().join("no.sol"))).code,
+            Some(0 | 3)
+        ));
+    }
+    std::fs::write(chain.path("ff"), good).unwrap();
+    rows.push(Row::new(
+        "32 matrices with one bit flipped: taken by the solver",
+        taken as f64,
+        0.0,
+        "checksums",
+    ));
+    for stage in [Stage::Build, Stage::Compute, Stage::Solve] {
+        let path = chain.path(stage.output());
+        let bytes = |threads: &str| {
+            run(chain.command(stage).args(["--threads", threads]));
+            tests::bytes(&path)
+        };
+        let differing = yes(bytes("1") != bytes("3"));
+        rows.push(Row::new(
+            format!("{} with 1 and 3 threads: differs", stage.output()),
+            differing,
+            0.0,
+            "byte for byte",
+        ));
+    }
     rows
 }
 
@@ -275,8 +464,17 @@ fn scene_row(name: &str, chain: &Chain) -> Row {
 
 #[test]
 fn every_row_meets_its_number() {
-    let parts: [fn() -> Vec<Row>; 7] =
-        [gaps_and_strips, wedges, scales_and_offsets, furnaces, few_and_many, eyes, folder_scenes];
+    let parts: [fn() -> Vec<Row>; 9] = [
+        gaps_and_strips,
+        contacts,
+        wedges,
+        scales_and_offsets,
+        furnaces,
+        solvers_and_files,
+        few_and_many,
+        eyes,
+        folder_scenes,
+    ];
     let rows: Vec<Row> = parts.into_iter().flat_map(|part| part()).collect();
     println!("{}", table(&rows));
     if let Some(path) = std::env::var_os("STRESS_INTO") {
