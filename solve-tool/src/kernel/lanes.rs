@@ -420,7 +420,7 @@ impl<T: Entry> Asking<T> {
             }
         }
         self.now = self.now.wrapping_add(chunk);
-        self.left -= 1;
+        self.left = self.left.saturating_sub(1);
         if self.left == 0 && self.row + 1 < R {
             self.row += 1;
             self.left = Self::share(strip);
