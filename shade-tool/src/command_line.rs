@@ -13,6 +13,7 @@ use crate::lit_scene::LitScene;
 use crate::local_picture::LocalRenderer;
 use crate::page::{self, PageArguments};
 use crate::picture::Picture;
+use crate::pixel_samples::Sampling;
 use crate::render::{Quality, Renderer};
 use crate::shading::ShadingArguments;
 use crate::sheet::SheetArguments;
@@ -151,6 +152,10 @@ pub struct RenderArguments {
     /// Samples along each side of a pixel
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
     pub samples: u32,
+    /// Samples along each side of a pixel that the border of a surface crosses, rounded to a multiple of --samples (default: as
+    /// --tolerance asks for, at least --samples)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub border_samples: Option<u32>,
     /// Local models.
     #[command(flatten)]
     pub shading: ShadingArguments,
@@ -310,7 +315,10 @@ fn run_render(arguments: &RenderArguments, common: &Common) -> Result<()> {
     let frames = cameras(arguments, &scene, &mut report)?;
     let precision = if arguments.float { Precision::Float } else { Precision::Half };
     let scheme_name = scheme.map_or("Constant".into(), |scheme| format!("{scheme:?}")).to_lowercase();
-    let provenance = Provenance::new(TOOL, VERSION).flag(format!("--samples {}", arguments.samples));
+    let sampling = arguments.sampling();
+    let provenance = Provenance::new(TOOL, VERSION)
+        .flag(format!("--samples {}", sampling.each))
+        .flag(format!("--border-samples {}", sampling.each * sampling.in_cell));
     let provenance = match &local {
         Some(model) => model.sign(provenance),
         None => provenance
@@ -331,12 +339,8 @@ fn run_render(arguments: &RenderArguments, common: &Common) -> Result<()> {
     });
     report.flags.clone_from(&provenance.flags);
 
-    let quality = Quality {
-        samples: arguments.samples as usize,
-        scheme,
-        tolerance: arguments.tolerance,
-        layers: arguments.layers.clone(),
-    };
+    let quality =
+        Quality { sampling, scheme, tolerance: arguments.tolerance, layers: arguments.layers.clone() };
     let opening =
         skips::opening(&arguments.scene.no_skip, Some(arguments.tolerance), scene.mean_irradiance());
     let mut renderer = match local {
@@ -351,7 +355,7 @@ fn run_render(arguments: &RenderArguments, common: &Common) -> Result<()> {
         let mut picture = match &mut renderer {
             Shader::Solution(renderer) => renderer.render(&frame.camera, &quality, common, &mut report),
             Shader::Local(renderer) => {
-                renderer.render(&frame.camera, quality.samples, &quality.layers, common, &mut report)
+                renderer.render(&frame.camera, quality.sampling, &quality.layers, common, &mut report)
             }
         };
         picture.bounces = report.phase("bounces", || {
@@ -488,6 +492,11 @@ fn read_scene(arguments: &SceneArguments, drawn: Drawn, report: &mut Report) -> 
 }
 
 impl RenderArguments {
+    /// What the flags say of samples.
+    pub fn sampling(&self) -> Sampling {
+        Sampling::new(self.samples as usize, self.border_samples.map(|side| side as usize), self.tolerance)
+    }
+
     /// What the flags say of the camera.
     pub fn wishes(&self) -> Wishes {
         let film = self.focal_length.zip(self.film);

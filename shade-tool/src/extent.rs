@@ -1,5 +1,6 @@
 //! How far facets reach across the picture.
 
+use crate::pixel_samples::RowSamples;
 use crate::visible::Seen;
 
 /// The part of the picture in which a facet is seen.
@@ -27,12 +28,12 @@ impl Extent {
     }
 }
 
-/// Extends the facets by samples, `per_pixel` in a row, of a picture so many pixels wide from row `top` on.
-pub fn extend(extents: &mut [Extent], seen: &[Seen], per_pixel: usize, (width, top): (usize, usize)) {
-    for (pixel, seen) in seen.chunks(per_pixel).enumerate() {
-        let place = [(pixel % width) as u32, (top + pixel / width) as u32];
-        for sample in seen {
-            if let Seen::Surface(element, ..) = sample {
+/// Extends the facets by the samples of row `row` of the picture.
+pub fn extend(extents: &mut [Extent], samples: &RowSamples, row: usize) {
+    for (column, samples) in samples.pixels().enumerate() {
+        let place = [column as u32, row as u32];
+        for sample in samples {
+            if let Seen::Surface(element, ..) = sample.seen {
                 let Extent { low, high } = &mut extents[element.index()];
                 (*low, *high) = ([0, 1].map(|c| low[c].min(place[c])), [0, 1].map(|c| high[c].max(place[c])));
             }
@@ -42,21 +43,29 @@ pub fn extend(extents: &mut [Extent], seen: &[Seen], per_pixel: usize, (width, t
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::unwrap_used)]
     use super::*;
-    use glam::DVec2;
-    use interchange::ids::ElementId;
+    use crate::camera::{Camera, Lens};
+    use crate::pixel_samples::{PixelSampler, Sampling};
+    use crate::test_scenes::{add_parallelogram, empty_mesh, lit};
+    use crate::visible::VisibleSurface;
+    use glam::DVec3;
 
-    /// Two samples a pixel, three pixels wide: a facet along a diagonal, one in a single pixel, one that is not seen.
+    /// A square of 2 x 2 elements that fills the middle of the picture: each reaches over half of it.
     #[test]
     fn facets_reach_from_their_first_to_their_last_pixel() {
-        let seen = |element: usize| Seen::Surface(ElementId::new(element), DVec2::ZERO, 1.0);
-        let none = Seen::Background;
-        let first = [none, seen(0), none, none, seen(1), seen(1)];
-        let second = [none, none, seen(0), none, none, none];
-        let mut extents = [Extent::default(); 3];
-        extend(&mut extents, &first, 2, (3, 4));
-        extend(&mut extents, &second, 2, (3, 6));
-        assert_eq!(extents.map(|extent| extent.is_seen()), [true, true, false]);
-        assert_eq!([extents[0].pixels(), extents[1].pixels()], [3.0, 1.0]);
+        let mut mesh = empty_mesh();
+        add_parallelogram(&mut mesh, DVec3::ZERO, 4.0 * DVec3::X, 4.0 * DVec3::Y, 2, 0);
+        add_parallelogram(&mut mesh, 50.0 * DVec3::X, DVec3::X, DVec3::Y, 1, 0);
+        let scene = lit(mesh);
+        let surface = VisibleSurface::new(&scene);
+        let middle = DVec3::new(2.0, 2.0, 0.0);
+        let camera =
+            Camera::new(middle + DVec3::Z, middle, DVec3::Y, Lens::Orthographic(8.0), [16, 16]).unwrap();
+        let sampler = PixelSampler::new(&surface, &camera, Sampling { each: 2, in_cell: 1 });
+        let mut extents = [Extent::default(); 5];
+        (0..16).for_each(|row| extend(&mut extents, &sampler.row(row, 0..16), row));
+        assert_eq!(extents.map(|extent| extent.is_seen()), [true, true, true, true, false]);
+        assert_eq!(extents[..4].iter().map(Extent::pixels).collect::<Vec<_>>(), [4.0; 4]);
     }
 }

@@ -17,6 +17,8 @@ pub struct FaceElements {
     sides: Vec<Option<FaceSide>>,
     /// Corners of each element in its face side's plane, counter-clockwise.
     corners: Vec<Vec<DVec2>>,
+    /// Of each element, a point of each edge's line and its unit direction.
+    lines: Vec<Vec<(DVec2, DVec2)>>,
 }
 
 /// One side of a face: a frame in its plane and a grid of cells.
@@ -53,7 +55,8 @@ impl FaceElements {
             FaceSide::new(plane.origin, axes, elements, &corners)
         });
         let sides = sides.collect();
-        FaceElements { sides, corners }
+        let lines = corners.iter().map(|corners| lines(corners)).collect();
+        FaceElements { sides, corners, lines }
     }
 
     /// The element of that side of the face (0 front, 1 back) which contains the point, and its place in the plane. Of
@@ -65,7 +68,7 @@ impl FaceElements {
         let deepest = |candidates: &mut dyn Iterator<Item = u32>| {
             let mut best: Option<(f64, u32)> = None;
             for element in candidates {
-                let depth = depth(&self.corners[element as usize], place);
+                let depth = depth(&self.lines[element as usize], place);
                 if best.is_none_or(|(deepest, _)| depth > deepest) {
                     best = Some((depth, element));
                 }
@@ -84,11 +87,16 @@ impl FaceElements {
     }
 }
 
-/// Least signed distance from the lines of the edges: positive within the polygon.
-fn depth(corners: &[DVec2], point: DVec2) -> f64 {
+/// A point of each edge's line and its unit direction.
+fn lines(corners: &[DVec2]) -> Vec<(DVec2, DVec2)> {
     let edges = corners.iter().zip(corners.iter().cycle().skip(1));
-    let distance = |(&a, &b): (&DVec2, &DVec2)| (b - a).normalize_or_zero().perp_dot(point - a);
-    edges.map(distance).fold(f64::INFINITY, f64::min)
+    edges.map(|(&a, &b)| (a, (b - a).normalize_or_zero())).collect()
+}
+
+/// Least signed distance from the lines of the edges: positive within the polygon.
+fn depth(lines: &[(DVec2, DVec2)], point: DVec2) -> f64 {
+    let distance = |&(start, along): &(DVec2, DVec2)| along.perp_dot(point - start);
+    lines.iter().map(distance).fold(f64::INFINITY, f64::min)
 }
 
 impl FaceSide {
@@ -162,7 +170,7 @@ mod tests {
                     let point = centre.lerp(corner, 0.999);
                     let (found, place) = finder.at(mesh.element_face(element), 0, point).unwrap();
                     assert_eq!(found, element);
-                    assert!(depth(finder.corners(element), place) > 0.0);
+                    assert!(depth(&lines(finder.corners(element)), place) > 0.0);
                 }
             }
         }
@@ -184,7 +192,7 @@ mod tests {
         let (front, _) = finder.at(FaceId(0), 0, point).unwrap();
         let (back, place) = finder.at(FaceId(0), 1, point).unwrap();
         assert_eq!((front.0, back.0), (0, 9));
-        assert!(depth(finder.corners(back), place) > 0.0, "back corners run clockwise");
+        assert!(depth(&lines(finder.corners(back)), place) > 0.0, "back corners run clockwise");
         assert!(finder.at(FaceId(0), 0, DVec3::new(-1.0, 5.0, 0.0)).is_some());
     }
 

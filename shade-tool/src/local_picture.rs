@@ -1,12 +1,13 @@
 //! The picture by a local model: what each sample sees, lit by emitters alone.
 
 use crate::camera::Camera;
+use crate::covered::Covered;
 use crate::direct_light::{Emitters, Scratch};
 use crate::gloss::{Gloss, View};
 use crate::layers::{Layer, NOTHING, Pixel};
 use crate::lit_scene::LitScene;
 use crate::picture::Picture;
-use crate::render::place_in_pixel;
+use crate::pixel_samples::{PixelSampler, Sample, Sampling};
 use crate::shading::LocalModel;
 use crate::visible::{Seen, VisibleSurface};
 use geometry::plane::Plane;
@@ -73,28 +74,33 @@ impl<'a> LocalRenderer<'a> {
             .collect()
     }
 
-    /// Renders with a camera, `samples` x `samples` of them in a pixel, and reports phases and counters.
+    /// Renders with a camera, and reports phases and counters.
     pub fn render(
         &self,
         camera: &Camera,
-        samples: usize,
+        sampling: Sampling,
         layers: &[Layer],
         common: &Common,
         report: &mut Report,
     ) -> Picture {
         let [width, height] = camera.size.map(|n| n as usize);
         let bar = common.progress("render", height);
-        let pixels: Vec<Pixel> = report.phase("shading", || {
-            (0..width * height)
+        let sampler = PixelSampler::new(&self.surface, camera, sampling);
+        let rows: Vec<(Vec<Pixel>, usize, usize)> = report.phase("shading", || {
+            (0..height)
                 .into_par_iter()
-                .map_init(Scratch::default, |scratch, k| {
-                    if k % width == 0 {
-                        bar.inc(1);
-                    }
-                    self.pixel(camera, [k % width, k / width], samples, scratch)
+                .map_init(Scratch::default, |scratch, row| {
+                    bar.inc(1);
+                    let samples = sampler.row(row, 0..width);
+                    let pixels =
+                        samples.pixels().map(|samples| self.pixel(camera, samples, scratch)).collect();
+                    (pixels, samples.rays, samples.borders)
                 })
                 .collect()
         });
+        report.count("samples", rows.iter().map(|row| row.1).sum());
+        report.count("border_pixels", rows.iter().map(|row| row.2).sum());
+        let pixels: Vec<Pixel> = rows.into_iter().flat_map(|row| row.0).collect();
         bar.finish_and_clear();
         let mut layers = layers.to_vec();
         layers.sort_unstable();
@@ -106,7 +112,6 @@ impl<'a> LocalRenderer<'a> {
             layers: layers.into_iter().map(|layer| (layer, layer.of(&pixels))).collect(),
             bounces: Vec::new(),
         };
-        report.count("samples", width * height * samples * samples);
         for (channel, mean) in ["r", "g", "b"].iter().zip(picture.mean()) {
             report.estimate(&format!("mean_radiance_{channel}"), mean);
         }
@@ -114,42 +119,26 @@ impl<'a> LocalRenderer<'a> {
     }
 
     /// Mean over the samples of a pixel.
-    fn pixel(
-        &self,
-        camera: &Camera,
-        [column, row]: [usize; 2],
-        samples: usize,
-        scratch: &mut Scratch,
-    ) -> Pixel {
+    fn pixel(&self, camera: &Camera, samples: &[Sample], scratch: &mut Scratch) -> Pixel {
         let mesh = &self.scene.mesh;
         let mut pixel = Pixel { element: NOTHING, face: NOTHING, ..Pixel::default() };
-        let share = 1.0 / (samples * samples) as f64;
-        let add = |sum: &mut [f64; 3], value: [f64; 3]| (0..3).for_each(|c| sum[c] += share * value[c]);
-        // The element that most samples see, the lower one of equals, gives indices and depth.
-        let mut depths: Vec<(u32, ElementId, f64)> = Vec::new();
-        for k in 0..samples * samples {
-            let [x, y] = place_in_pixel(k, samples);
-            let (x, y) = (column as f64 + x, row as f64 + y);
-            let Seen::Surface(element, _, depth) = self.surface.seen(camera, x, y) else { continue };
+        let mut covered = Covered::default();
+        for sample in samples {
+            let Seen::Surface(element, _, depth) = sample.seen else { continue };
             let Some(plane) = self.planes[element.index()] else { continue };
-            let (origin, direction) = camera.ray(x, y);
+            let add =
+                |sum: &mut [f64; 3], value: [f64; 3]| (0..3).for_each(|c| sum[c] += sample.share * value[c]);
+            let (origin, direction) = camera.ray(sample.at[0], sample.at[1]);
             let point = plane.project(origin + depth * direction);
             let (radiance, irradiance) = self.shade(element, &plane, point, -direction, scratch);
             add(&mut pixel.radiance, radiance);
             add(&mut pixel.irradiance, irradiance);
             add(&mut pixel.albedo, self.scene.material(element).diffuse);
             add(&mut pixel.normal, plane.normal.to_array());
-            depths.push((self.scene.source_of[element.index()], element, depth));
+            let face = mesh.face_inputs[mesh.element_face(element).index()];
+            covered.add(self.scene.source_of[element.index()], face, depth, sample.share);
         }
-        depths.sort_by_key(|&(source, ..)| source);
-        let most = depths
-            .chunk_by(|a, b| a.0 == b.0)
-            .max_by_key(|chunk| (chunk.len(), std::cmp::Reverse(chunk[0].0)));
-        if let Some(chunk) = most {
-            pixel.element = chunk[0].0;
-            pixel.face = mesh.face_inputs[mesh.element_face(chunk[0].1).index()];
-            pixel.depth = chunk.iter().map(|&(.., depth)| depth).sum::<f64>() / chunk.len() as f64;
-        }
+        covered.tell(&mut pixel);
         pixel
     }
 
@@ -203,7 +192,7 @@ mod tests {
         let mut report = Report::new("shade-tool", "test");
         let common = Common { threads: None, quiet: true, verbose: false };
         let renderer = LocalRenderer::new(scene, model, &mut report);
-        let picture = renderer.render(camera, 2, layers, &common, &mut report);
+        let picture = renderer.render(camera, Sampling { each: 2, in_cell: 2 }, layers, &common, &mut report);
         (picture, report)
     }
 

@@ -1,8 +1,9 @@
 //! The picture: visible surface per sample, irradiance at the nodes that are seen, interpolated between them
-//! (Gouraud 1971) or gathered at the sample, plain mean over the samples of a pixel. Samples have fixed places, so a
-//! picture has no noise and is the same for any number of threads.
+//! (Gouraud 1971) or gathered at the sample, mean over the samples of a pixel ([`crate::pixel_samples`]). Samples have fixed
+//! places, so a picture has no noise and is the same for any number of threads.
 
 use crate::camera::Camera;
+use crate::covered::Covered;
 use crate::extent::{Extent, extend};
 use crate::interpolation::corner_weights;
 use crate::judge::Scheme;
@@ -11,6 +12,7 @@ use crate::light::Part;
 use crate::lit_scene::LitScene;
 use crate::nodes::NodeRadiosity;
 use crate::picture::Picture;
+use crate::pixel_samples::{PixelSampler, RowSamples, Sample, Sampling};
 use crate::receiver::{Parts, total};
 use crate::refined::Found;
 use crate::refined_parts::RefinedParts;
@@ -33,8 +35,8 @@ const SAMPLES_PER_BAND: usize = 1 << 20;
 /// How a picture is sampled and how well irradiance is interpolated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quality {
-    /// Samples along each side of a pixel.
-    pub samples: usize,
+    /// Samples of a pixel.
+    pub sampling: Sampling,
     /// Interpolation over facets, `None` for the solution's own constant values.
     pub scheme: Option<Scheme>,
     /// Facets are cut while interpolation is off by more than this part of the value.
@@ -49,6 +51,8 @@ pub struct Renderer<'a> {
     scene: &'a LitScene,
     surface: VisibleSurface,
     nodes: NodeRadiosity<'a>,
+    /// Unit normal of each element.
+    normals: Vec<[f64; 3]>,
 }
 
 /// Renders the scene with one camera.
@@ -71,6 +75,7 @@ struct Looks<'a> {
     scene: &'a LitScene,
     surface: &'a VisibleSurface,
     nodes: &'a NodeRadiosity<'a>,
+    normals: &'a [[f64; 3]],
     refined: Option<&'a RefinedParts>,
     gathered: &'a AtomicU64,
 }
@@ -80,7 +85,9 @@ impl<'a> Renderer<'a> {
     pub fn new(scene: &'a LitScene, opening: Opening, report: &mut Report) -> Renderer<'a> {
         let surface = report.phase("hierarchy", || VisibleSurface::new(scene));
         let nodes = report.phase("gatherer", || NodeRadiosity::new(scene, opening));
-        Renderer { scene, surface, nodes }
+        let normal = |element| polygon::vector_area(&scene.mesh.element_corners(element)).normalize_or_zero();
+        let normals = scene.mesh.element_ids().map(|element| normal(element).to_array()).collect();
+        Renderer { scene, surface, nodes, normals }
     }
 
     /// Renders with a camera, and reports phases and counters.
@@ -92,30 +99,29 @@ impl<'a> Renderer<'a> {
         report: &mut Report,
     ) -> Picture {
         let [width, height] = camera.size.map(|n| n as usize);
-        let samples = quality.samples;
-        let per_pixel = samples * samples;
+        let per_pixel = quality.sampling.each * quality.sampling.each;
         let rows_per_band = (SAMPLES_PER_BAND / (width * per_pixel)).max(1);
         let bands: Vec<Range<usize>> =
             (0..height).step_by(rows_per_band).map(|top| top..(top + rows_per_band).min(height)).collect();
         let surface = &self.surface;
-        let look = |band: &Range<usize>, bar: &ProgressBar| -> Vec<Seen> {
-            let rows = band.clone().into_par_iter();
+        let sampler = PixelSampler::new(surface, camera, quality.sampling);
+        let look = |band: &Range<usize>, bar: &ProgressBar| -> Vec<RowSamples> {
             let of_row = |row| {
                 bar.inc(1);
-                samples_of_row(surface, camera, row, samples)
+                sampler.row(row, 0..width)
             };
-            rows.flat_map_iter(of_row).collect()
+            band.clone().into_par_iter().map(of_row).collect()
         };
 
-        // Find what every sample sees, and so how many samples every facet has; a single band is kept for later.
+        // Find what every sample sees, and so how far every facet reaches; a single band is kept for later.
         let mut kept = None;
         let mut extents = vec![Extent::default(); self.scene.mesh.element_count()];
         report.phase("visible surface", || {
             let bar = common.progress("visible surface", height);
             for band in &bands {
-                let seen = look(band, &bar);
-                extend(&mut extents, &seen, per_pixel, (width, band.start));
-                kept = (bands.len() == 1).then_some(seen);
+                let rows = look(band, &bar);
+                band.clone().zip(&rows).for_each(|(row, samples)| extend(&mut extents, samples, row));
+                kept = (bands.len() == 1).then_some(rows);
             }
         });
 
@@ -137,34 +143,44 @@ impl<'a> Renderer<'a> {
         let mut layers = quality.layers.clone();
         layers.sort_unstable();
         layers.dedup();
-        report.count("background_samples", 0);
-        report.count("back_face_samples", 0);
         let gathered = AtomicU64::new(0);
         let looks = Looks {
             scene: self.scene,
             surface,
             nodes: &self.nodes,
+            normals: &self.normals,
             refined: refined.as_ref(),
             gathered: &gathered,
         };
         let start = Instant::now();
-        let bar = common.progress("interpolation", width * height);
+        let bar = common.progress("interpolation", height);
+        let (mut rays, mut borders, mut background, mut back) = (0, 0, 0.0, 0.0);
         for band in &bands {
-            let seen = kept.take().unwrap_or_else(|| look(band, &ProgressBar::hidden()));
-            count_unlit(&seen, report);
-            let pixels: Vec<Pixel> = seen
-                .par_chunks(per_pixel)
-                .map_init(<(Vec<f64>, Scratch)>::default, |memory, seen| {
+            let rows = kept.take().unwrap_or_else(|| look(band, &ProgressBar::hidden()));
+            let pixels: Vec<Vec<Pixel>> = rows
+                .par_iter()
+                .map_init(<(Vec<f64>, Scratch)>::default, |memory, row| {
                     bar.inc(1);
-                    looks.pixel(seen, memory)
+                    row.pixels().map(|samples| looks.pixel(samples, memory)).collect()
                 })
                 .collect();
+            let pixels = pixels.concat();
             picture.pixels.extend(pixels.iter().map(|pixel| pixel.radiance));
             append_layers(&mut picture.layers, &layers, &pixels);
+            for row in &rows {
+                (rays, borders) = (rays + row.rays, borders + row.borders);
+                for sample in row.pixels().flatten() {
+                    background += if sample.seen == Seen::Background { sample.share } else { 0.0 };
+                    back += if sample.seen == Seen::Back { sample.share } else { 0.0 };
+                }
+            }
         }
         report.phases.push(Phase { name: "interpolation".into(), seconds: start.elapsed().as_secs_f64() });
         bar.finish_and_clear();
-        report.count("samples", width * height * per_pixel);
+        report.count("samples", rays);
+        report.count("border_pixels", borders);
+        report.count("background_pixels", background.round() as usize);
+        report.count("back_face_pixels", back.round() as usize);
         report.count("samples_gathered", gathered.load(Ordering::Relaxed) as usize);
         if let Some(refined) = &refined {
             refined.count(report);
@@ -197,47 +213,17 @@ fn append_layers(all: &mut Vec<(Layer, Values)>, layers: &[Layer], pixels: &[Pix
     }
 }
 
-/// Samples of a row, pixel by pixel.
-fn samples_of_row<'a>(
-    surface: &'a VisibleSurface,
-    camera: &'a Camera,
-    row: usize,
-    samples: usize,
-) -> impl Iterator<Item = Seen> + 'a {
-    (0..camera.size[0] as usize * samples * samples).map(move |i| {
-        let (column, k) = (i / (samples * samples), i % (samples * samples));
-        let [x, y] = place_in_pixel(k, samples);
-        surface.seen(camera, column as f64 + x, row as f64 + y)
-    })
-}
-
-/// Place within its pixel of sample `k`: one in each cell of a regular grid, and all in different columns and rows of a grid
-/// so many times finer (as Kensler 2013, "Correlated Multi-Jittered Sampling", before jitter). So an edge along rows or
-/// columns, as most edges of rooms are, is covered in n^2 steps instead of n. His arrangement has n samples on the
-/// pixel's diagonal, where edges of rooms seen straight run; counting one axis backwards leaves it free.
-pub(crate) fn place_in_pixel(k: usize, samples: usize) -> [f64; 2] {
-    let n = samples as f64;
-    let (column, row) = ((k % samples) as f64, (k / samples) as f64);
-    [(column + (row + 0.5) / n) / n, (row + (n - column - 0.5) / n) / n]
-}
-
-fn count_unlit(seen: &[Seen], report: &mut Report) {
-    report.count("background_samples", seen.iter().filter(|s| **s == Seen::Background).count());
-    report.count("back_face_samples", seen.iter().filter(|s| **s == Seen::Back).count());
-}
-
 impl Looks<'_> {
     /// Mean over the samples of a pixel.
-    fn pixel(&self, seen: &[Seen], (weights, scratch): &mut (Vec<f64>, Scratch)) -> Pixel {
+    fn pixel(&self, samples: &[Sample], (weights, scratch): &mut (Vec<f64>, Scratch)) -> Pixel {
         let mut pixel = Pixel { element: NOTHING, face: NOTHING, ..Pixel::default() };
         let add = |sum: &mut [f64; 3], value: [f64; 3], factor: f64| {
             (0..3).for_each(|c| sum[c] += factor * value[c]);
         };
-        let share = 1.0 / seen.len().max(1) as f64;
-        let radiance = share * FRAC_1_PI;
-        let mut depths: Vec<(u32, u32, f64)> = Vec::new();
-        for sample in seen {
-            let Seen::Surface(element, place, depth) = *sample else { continue };
+        let mut covered = Covered::default();
+        for sample in samples {
+            let Seen::Surface(element, place, depth) = sample.seen else { continue };
+            let (share, radiance) = (sample.share, sample.share * FRAC_1_PI);
             let (material, source) = (self.scene.material(element), self.scene.source_of[element.index()]);
             let (exitance, rho) = (material.exitance(), material.diffuse);
             let (parts, error) = self.irradiance(element, place, weights, scratch);
@@ -252,21 +238,12 @@ impl Looks<'_> {
             add(&mut pixel.irradiance, irradiance, share);
             add(&mut pixel.direct, std::array::from_fn(|c| exitance[c] + rho[c] * parts[c]), radiance);
             add(&mut pixel.indirect, std::array::from_fn(|c| rho[c] * parts[c + 3]), radiance);
-            let corners = self.scene.mesh.element_corners(element);
-            add(&mut pixel.normal, polygon::vector_area(&corners).normalize_or_zero().to_array(), share);
+            add(&mut pixel.normal, self.normals[element.index()], share);
             pixel.error += radiance * error;
             let face = self.scene.mesh.face_inputs[self.scene.mesh.element_face(element).index()];
-            depths.push((source, face, depth));
+            covered.add(source, face, depth, share);
         }
-        // The element most samples see, the lower one of equals, gives indices and depth.
-        depths.sort_by_key(|&(source, ..)| source);
-        let most = depths
-            .chunk_by(|a, b| a.0 == b.0)
-            .max_by_key(|chunk| (chunk.len(), std::cmp::Reverse(chunk[0].0)));
-        if let Some(chunk) = most {
-            (pixel.element, pixel.face) = (chunk[0].0, chunk[0].1);
-            pixel.depth = chunk.iter().map(|&(.., depth)| depth).sum::<f64>() / chunk.len() as f64;
-        }
+        covered.tell(&mut pixel);
         pixel
     }
 
@@ -317,7 +294,12 @@ mod tests {
     }
 
     fn fine(samples: usize) -> Quality {
-        Quality { samples, scheme: Some(Scheme::Linear), tolerance: 0.01, layers: Vec::new() }
+        Quality {
+            sampling: Sampling { each: samples, in_cell: 2 },
+            scheme: Some(Scheme::Linear),
+            tolerance: 0.01,
+            layers: Vec::new(),
+        }
     }
 
     fn rendered(scene: &LitScene, camera: &Camera, quality: &Quality, report: &mut Report) -> Picture {
@@ -326,25 +308,6 @@ mod tests {
 
     fn report() -> Report {
         Report::new("shade-tool", "test")
-    }
-
-    #[test]
-    fn samples_fall_into_all_cells_rows_and_columns_once() {
-        for n in [1, 2, 3, 4, 8] {
-            let places: Vec<[f64; 2]> = (0..n * n).map(|k| place_in_pixel(k, n)).collect();
-            let all = |key: &dyn Fn(&[f64; 2]) -> usize| {
-                let mut keys: Vec<usize> = places.iter().map(key).collect();
-                keys.sort_unstable();
-                keys == (0..n * n).collect::<Vec<_>>()
-            };
-            let (side, fine) = (n as f64, (n * n) as f64);
-            assert!(all(&|p| (p[0] * side) as usize + n * (p[1] * side) as usize));
-            assert!(all(&|p| (p[0] * fine) as usize) && all(&|p| (p[1] * fine) as usize));
-            let on_diagonals = places.iter().filter(|p| p[0] == p[1] || p[0] + p[1] == 1.0).count();
-            assert_eq!(on_diagonals, n % 2, "{places:?}");
-            let mean = places.iter().fold(0.0, |sum, p| sum + p[0]) / fine;
-            assert!((mean - 0.5).abs() < 1e-12, "{mean}");
-        }
     }
 
     #[test]
@@ -361,8 +324,11 @@ mod tests {
             for value in picture.pixels.iter().flatten() {
                 assert!((value - FRAC_1_PI).abs() < 1e-9, "{value}");
             }
-            assert_eq!(report.counters["samples"], 16 * 12 * 9);
-            assert_eq!(report.counters["background_samples"] + report.counters["back_face_samples"], 0);
+            let borders = report.counters["border_pixels"];
+            assert!((20..120).contains(&borders), "{borders}");
+            // 3 x 3 of a pixel, 2 at each end of a column in a row, 6 x 6 at a border.
+            assert_eq!(report.counters["samples"], 16 * 12 * 9 + 17 * 2 * 12 + borders * 36);
+            assert_eq!(report.counters["background_pixels"] + report.counters["back_face_pixels"], 0);
             let nodes = ["nodes_gathered", "nodes_split", "nodes_black_skipped", "nodes_unseen_skipped"];
             let total: u64 = nodes.iter().map(|name| report.counters[*name]).sum();
             assert_eq!(total as usize, scene.mesh.node_vertices.len());
@@ -376,16 +342,18 @@ mod tests {
         let camera = Camera::framing(scene.bounds(), DVec3::Y, Lens::Vertical(40.0), [32, 32]).unwrap();
         let mut framed = report();
         let picture = rendered(&scene, &camera, &fine(2), &mut framed);
-        assert_eq!(framed.counters["back_face_samples"], 0);
-        assert!(framed.counters["background_samples"] > 100);
+        assert_eq!(framed.counters["back_face_pixels"], 0);
+        assert!(framed.counters["background_pixels"] > 100);
         assert!((picture.pixels[16 * 32 + 16][0] - FRAC_1_PI).abs() < 1e-9);
         assert_eq!(picture.pixels[0], [0.0; 3]);
 
         let placed = Camera { framing: false, ..camera };
         let mut seen = report();
         let picture = rendered(&scene, &placed, &fine(2), &mut seen);
-        assert_eq!(seen.counters["background_samples"], framed.counters["background_samples"]);
-        assert_eq!(seen.counters["background_samples"] + seen.counters["back_face_samples"], 4 * 32 * 32);
+        assert_eq!(seen.counters["background_pixels"], framed.counters["background_pixels"]);
+        // Each is rounded.
+        let unlit = seen.counters["background_pixels"] + seen.counters["back_face_pixels"];
+        assert!(unlit.abs_diff(32 * 32) <= 1, "{unlit}");
         assert!(picture.pixels.iter().all(|p| *p == [0.0; 3]));
         assert_eq!(seen.counters["nodes_gathered"], 0);
     }
