@@ -53,6 +53,7 @@ fn a_row_is_painted_in_every_format() {
     };
     fails(7, "r.png", "there is no element 7");
     fails(1, "r.stl", "must end in .png, .ply");
+    fails(1, "r.vtk", "did you mean r.vtu?");
     fails(1, "r.vs3", "must end in .png, .ply");
 }
 
