@@ -17,6 +17,7 @@ use crate::store::Store;
 use clap::ValueEnum;
 use interchange::matrix::Precision;
 use interchange::report::Report;
+use interchange::tool::{STEPS_OF_FALL, progress, show_fall};
 use passes::Passes;
 
 /// Largest defect of a row sum that is closed: a larger one is an error to be looked at, not to be hidden.
@@ -256,6 +257,7 @@ fn conjugate_gradients(
     let mut preconditioned = scaled(&residual);
     let mut direction = preconditioned.clone();
     let mut descent = dot(&residual, &preconditioned);
+    let (bar, first) = (progress("closure", STEPS_OF_FALL), solved.defect);
     while solved.defect > target && solved.steps < MOST_STEPS && descent > 0.0 {
         let mut image = passes.apply(&direction)?;
         for i in 0..n {
@@ -276,6 +278,7 @@ fn conjugate_gradients(
             solved.defect = now;
             best.clone_from(&current);
         }
+        show_fall(&bar, first, solved.defect, target);
         preconditioned = scaled(&residual);
         let next = dot(&residual, &preconditioned);
         let turn = next / descent;

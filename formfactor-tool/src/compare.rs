@@ -9,6 +9,7 @@ use interchange::grouping::Grouping;
 use interchange::ids::ElementId;
 use interchange::matrix::Matrix;
 use interchange::mesh::Mesh;
+use interchange::tool::progress;
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::path::Path;
@@ -90,7 +91,8 @@ impl Difference {
         let factors = [Factors::new(&sides[0], &elements)?, Factors::new(&sides[1], &elements)?];
         let mut rows = Vec::with_capacity(count);
         let (mut absolute, mut relative) = (Entry::default(), Entry::default());
-        for ((from, a), (_, b)) in factors[0].rows().zip(factors[1].rows()) {
+        let pairs = factors[0].rows().zip(factors[1].rows());
+        for ((from, a), (_, b)) in progress("compare", count).wrap_iter(pairs) {
             let mut sum = 0.0;
             for (to, (&first, &second)) in a.iter().zip(&b).enumerate() {
                 let entry = Entry { from, to, first, second };

@@ -10,6 +10,7 @@ use interchange::error::Result;
 use interchange::grouping::{By, Grouping};
 use interchange::matrix::{BlockView, Matrix};
 use interchange::mesh::Mesh;
+use interchange::tool::progress;
 use std::ops::Range;
 use std::path::Path;
 
@@ -66,7 +67,8 @@ impl RowSource for Keyed<'_> {
     }
 
     fn rows(&self) -> Box<dyn Iterator<Item = Vec<f64>> + '_> {
-        Box::new(self.factors.rows().map(|(_, row)| row))
+        let bar = progress("export", self.factors.count);
+        Box::new(bar.wrap_iter(self.factors.rows()).map(|(_, row)| row))
     }
 }
 

@@ -25,7 +25,7 @@ pub use table::{RowSource, Table};
 
 use clap::ValueEnum;
 use interchange::atomic_write::is_stdout;
-use interchange::error::{Error, Result};
+use interchange::error::{Error, Result, meant_ending};
 use std::path::Path;
 
 /// How a table of factors is written.
@@ -67,8 +67,11 @@ impl Format {
             || for_stdout.or(ENDINGS.iter().find(|(name, _)| *name == ending).map(|(_, format)| *format));
         asked.or_else(by_ending).ok_or_else(|| {
             let names: Vec<String> = ENDINGS.iter().map(|(name, _)| format!(".{name}")).collect();
-            let message =
-                format!("the name must end in {}, which says the format; or say --format", names.join(", "));
+            let message = format!(
+                "the name must end in {}, which says the format{}; or say --format",
+                names.join(", "),
+                meant_ending(path, ENDINGS.map(|(name, _)| name))
+            );
             Error::whole(path, message)
         })
     }

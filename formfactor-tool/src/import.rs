@@ -21,7 +21,7 @@ use interchange::matrix::{MatrixRecord, PackedBlock, Precision};
 use interchange::mesh::Mesh;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
-use interchange::tool::{Finish, positive};
+use interchange::tool::{Finish, positive, progress};
 use std::path::{Path, PathBuf};
 
 /// Rows and columns of a block.
@@ -272,7 +272,7 @@ impl Imported<'_> {
             to_itself: 0,
             strangers: 0,
         };
-        for row in 0..self.table.count() {
+        for row in progress("check", self.table.count()).wrap_iter(0..self.table.count()) {
             let (i, (columns, values)) = (element_of[row], self.table.row(row));
             if i == usize::MAX {
                 found.strangers += usize::from(!values.is_empty());
@@ -316,9 +316,13 @@ impl Imported<'_> {
             let forth = self.areas[i] * self.get(i, j);
             if symmetric { 0.5 * (forth + self.areas[j] * self.get(j, i)) } else { forth }
         };
+        let bar = progress("blocks", count.div_ceil(BLOCK).pow(2));
         for first in (0..count).step_by(BLOCK) {
+            // Of a symmetric matrix row k of blocks is k blocks shorter.
+            bar.inc(if symmetric { (first / BLOCK) as u64 } else { 0 });
             let rows = first..(first + BLOCK).min(count);
             for start in (if symmetric { first } else { 0 }..count).step_by(BLOCK) {
+                bar.inc(1);
                 let columns = start..(start + BLOCK).min(count);
                 let triangle = symmetric && start == first;
                 let mut entries = Vec::with_capacity(rows.len() * columns.len());

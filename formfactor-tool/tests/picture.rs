@@ -53,6 +53,8 @@ fn a_row_is_painted_in_every_format() {
     };
     fails(7, "r.png", "there is no element 7");
     fails(1, "r.stl", "must end in .png, .ply");
+    let meant = format!("did you mean {}?", room.path("r.vtu").display());
+    fails(1, "r.vtk", &meant);
     fails(1, "r.vs3", "must end in .png, .ply");
 }
 

@@ -117,6 +117,8 @@ fn a_foreign_mesh_and_an_unknown_ending_are_refused() {
         export::run(&[&room.matrix], &room.mesh, By::Group, None, &room.path(name)).unwrap_err().to_string()
     };
     assert!(refusal("f.txt").contains(".csv, .npy, .npz, .mtx, .rmx, .vf"));
+    let meant = refusal("f.npi");
+    assert!(meant.contains(&format!("did you mean {}?", room.path("f.npy").display())), "{meant}");
     let mut mesh = room::mesh();
     mesh.vertices[0][0] = -0.5;
     mesh.write(&room.mesh, Provenance::new("test", "1")).unwrap();

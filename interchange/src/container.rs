@@ -10,6 +10,7 @@ use crate::digest::Digest;
 use crate::error::{Error, Result};
 use crate::mapping;
 use crate::provenance::Provenance;
+use crate::tool::progress;
 use bytemuck::{AnyBitPattern, NoUninit};
 use memmap2::Mmap;
 use rayon::prelude::*;
@@ -27,6 +28,8 @@ pub const VERSION: (u16, u16) = (1, 1);
 const ENVELOPE_LENGTH: usize = 32;
 /// Checksums of large sections are computed in pieces of this many bytes on all cores.
 const CHECKSUM_PIECE: usize = 1 << 22;
+/// Pieces between two steps of the bar: enough for all cores.
+const CHECKSUM_PIECES: usize = 64;
 
 /// What a file holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -145,7 +148,8 @@ fn envelope(kind: Kind, header: &[u8]) -> [u8; ENVELOPE_LENGTH] {
 /// CRC-32 of `bytes`.
 fn checksum(bytes: &[u8]) -> u32 {
     let mut whole = crc32fast::Hasher::new();
-    checksum_into(&mut whole, bytes);
+    let parts = bytes.chunks(CHECKSUM_PIECES * CHECKSUM_PIECE);
+    progress("checksums", parts.len()).wrap_iter(parts).for_each(|part| checksum_into(&mut whole, part));
     whole.finalize()
 }
 

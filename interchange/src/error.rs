@@ -138,18 +138,28 @@ pub fn nearest_name<'a>(wanted: &str, candidates: impl Iterator<Item = &'a str>)
         .map(|(_, candidate)| candidate)
 }
 
-/// Levenshtein distance, letters compared without case.
+/// `; did you mean m.npy?` for `m.npi`, where one of `endings` is close to that of `path`; else nothing.
+pub fn meant_ending<'a>(path: &Path, endings: impl IntoIterator<Item = &'a str>) -> String {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().into_owned()).unwrap_or_default();
+    nearest_name(&ending, endings.into_iter())
+        .map_or_else(String::new, |near| format!("; did you mean {}?", path.with_extension(near).display()))
+}
+
+/// Levenshtein distance, letters compared without case; two letters that change places count once, as people slip that way.
 fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.to_lowercase().chars().collect();
+    let [a, b] = [a, b].map(|word| word.to_lowercase().chars().collect::<Vec<char>>());
+    let mut above = vec![0; b.len() + 1];
     let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, letter) in a.to_lowercase().chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
+    for (i, letter) in a.iter().enumerate() {
+        let mut next = vec![i + 1; b.len() + 1];
         for (j, other) in b.iter().enumerate() {
-            let substituted = diagonal + usize::from(letter != *other);
-            diagonal = row[j + 1];
-            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
+            let substituted = row[j] + usize::from(letter != other);
+            next[j + 1] = substituted.min(row[j + 1] + 1).min(next[j] + 1);
+            if i > 0 && j > 0 && (a[i - 1], letter) == (*other, &b[j - 1]) {
+                next[j + 1] = next[j + 1].min(above[j - 1] + 1);
+            }
         }
+        above = std::mem::replace(&mut row, next);
     }
     row[b.len()]
 }
@@ -159,10 +169,20 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_wrong_ending_is_told_with_the_name_that_was_meant() {
+        let meant = |name: &str| meant_ending(Path::new(name), ["csv", "npy", "npz"]);
+        assert_eq!(meant("out/m.npi"), "; did you mean out/m.npy?");
+        assert_eq!(meant("m.cvs"), "; did you mean m.csv?");
+        assert_eq!((meant("m.exr"), meant("m")), (String::new(), String::new()));
+    }
+
+    #[test]
     fn nearest_name_finds_a_slip_and_refuses_a_stranger() {
         let names = ["white", "red", "green"];
         assert_eq!(nearest_name("whit", names.iter().copied()), Some("white"));
         assert_eq!(nearest_name("Green", names.iter().copied()), Some("green"));
+        assert_eq!(nearest_name("rde", names.iter().copied()), Some("red"));
+        assert_eq!(edit_distance("illuminance", "iluminacne"), 2);
         assert_eq!(nearest_name("concrete", names.iter().copied()), None);
     }
 }

@@ -26,7 +26,7 @@ pub mod vtu;
 pub use surface::{Field, Surface, Values};
 
 use crate::atomic_write::Outcome;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, meant_ending};
 use std::path::Path;
 
 /// What the end of a file name asks for.
@@ -67,7 +67,8 @@ impl Format {
     pub fn required(path: &Path) -> Result<Self> {
         Self::of(path).ok_or_else(|| {
             let names: Vec<String> = ENDINGS.iter().map(|(name, _)| format!(".{name}")).collect();
-            let message = format!("the name must end in {}, which says the format", names.join(", "));
+            let meant = meant_ending(path, ENDINGS.map(|(name, _)| name));
+            let message = format!("the name must end in {}, which says the format{meant}", names.join(", "));
             Error::whole(path, message)
         })
     }
@@ -99,7 +100,10 @@ pub fn read_scene(path: &Path) -> Result<(Surface, Vec<String>)> {
         Some(Format::Obj) => Err(Error::whole(path, "mesh-tool build reads OBJ as it is")),
         _ => Err(Error::whole(
             path,
-            "the name must end in .vs3 (View3D) or .rad (Radiance), which says the format",
+            format!(
+                "the name must end in .vs3 (View3D) or .rad (Radiance), which says the format{}",
+                meant_ending(path, ["vs3", "rad"])
+            ),
         )),
     }
 }

@@ -16,6 +16,7 @@ use crate::container::{File, Kind};
 use crate::digest::Digest;
 use crate::error::{Error, Result};
 use crate::provenance::Provenance;
+use crate::tool::progress;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -252,12 +253,15 @@ impl Matrix {
         let areas = self.areas()?;
         let mirrored = self.record().symmetric;
         let mut sums = vec![0.0; self.element_count()];
-        self.for_each(|i, j, s| {
-            sums[i] += s;
-            if mirrored && i != j {
-                sums[j] += s;
-            }
-        })?;
+        let views = self.views()?;
+        for view in progress("row sums", views.len()).wrap_iter(views.iter()) {
+            view.for_each(|i, j, s| {
+                sums[i] += s;
+                if mirrored && i != j {
+                    sums[j] += s;
+                }
+            });
+        }
         Ok(sums.iter().zip(areas).map(|(sum, area)| sum / area).collect())
     }
 }

@@ -1,7 +1,7 @@
 //! Tables for people and other programs: CSV by RFC 4180 with 17 digits, and npy.
 
 use crate::atomic_write::{self, Outcome};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, meant_ending};
 use std::path::Path;
 
 /// What the end of a file name asks for.
@@ -24,8 +24,12 @@ impl TableFormat {
         let name = |wanted: &TableFormat| format.iter().find(|(_, f)| f == wanted).map_or("", |(n, _)| *n);
         let found = format.iter().find(|(n, f)| *n == ending && allowed.contains(f)).map(|(_, f)| *f);
         found.ok_or_else(|| {
+            let meant = meant_ending(path, allowed.iter().map(name));
             let names: Vec<String> = allowed.iter().map(|f| format!(".{}", name(f))).collect();
-            Error::whole(path, format!("the name must end in {}, which says the format", names.join(" or ")))
+            Error::whole(
+                path,
+                format!("the name must end in {}, which says the format{meant}", names.join(" or ")),
+            )
         })
     }
 }

@@ -10,9 +10,14 @@ use std::fmt::Display;
 use std::io::IsTerminal;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread;
+use std::time::Duration;
 
 /// Steps of a bar that [`show_fall`] moves.
 pub const STEPS_OF_FALL: usize = 1000;
+
+/// What takes less time shows no bar: one that comes and goes at once tells nothing.
+const BEFORE_BAR: Duration = Duration::from_secs(1);
 
 /// Whether bars are drawn: not before [`Common::start`], so that nothing but a program draws any.
 static SHOWS_PROGRESS: AtomicBool = AtomicBool::new(false);
@@ -83,15 +88,25 @@ impl Common {
     }
 }
 
-/// A bar for `steps` of work with the time left, on a terminal; nothing elsewhere or with `--quiet`. It goes when dropped.
+/// A bar for `steps` of work with the time left, on a terminal, from the first step after a second on; nothing elsewhere or
+/// with `--quiet`. It goes when dropped.
 pub fn progress(title: &'static str, steps: usize) -> ProgressBar {
     if !SHOWS_PROGRESS.load(Ordering::Relaxed) {
         return ProgressBar::hidden();
     }
-    let bar = ProgressBar::with_draw_target(Some(steps as u64), ProgressDrawTarget::stderr());
+    let bar = ProgressBar::with_draw_target(Some(steps as u64), ProgressDrawTarget::hidden());
     let style = ProgressStyle::with_template("{prefix} [{wide_bar}] {percent} % {eta} left");
     let bar = bar.with_prefix(title).with_finish(ProgressFinish::AndClear);
-    bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+    let bar = bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    // Hidden, it counts and estimates all the same. Without a thread to be had the work is done unseen.
+    let later = bar.downgrade();
+    let _ = thread::Builder::new().spawn(move || {
+        thread::sleep(BEFORE_BAR);
+        if let Some(bar) = later.upgrade().filter(|bar| !bar.is_finished()) {
+            bar.set_draw_target(ProgressDrawTarget::stderr());
+        }
+    });
+    bar
 }
 
 /// Shows how far an iteration is that lowers `measure` from `first` to `last` by about the same factor in each step. The bar

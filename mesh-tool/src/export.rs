@@ -2,6 +2,7 @@
 
 use interchange::Result;
 use interchange::atomic_write::refuse_input;
+use interchange::error::meant_ending;
 use interchange::foreign::{self, Field, Format, Surface};
 use interchange::materials::MaterialTable;
 use interchange::mesh::Mesh;
@@ -32,7 +33,10 @@ pub fn write(path: &Path, output: &Path) -> Result<()> {
 pub fn convert(path: &Path, output: &Path) -> Result<Vec<String>> {
     refuse_input(output, [path])?;
     if Format::of(output) != Some(Format::Obj) {
-        return Err(interchange::Error::whole(output, "expected a name ending in .obj"));
+        return Err(interchange::Error::whole(
+            output,
+            format!("expected a name ending in .obj{}", meant_ending(output, ["obj"])),
+        ));
     }
     let (surface, said) = foreign::read_scene(path)?;
     foreign::write(output, &surface)?;

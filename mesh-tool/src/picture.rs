@@ -4,6 +4,7 @@
 use geometry::plane::{PLANARITY, Plane};
 use geometry::polygon;
 use glam::{DVec2, DVec3};
+use interchange::error::meant_ending;
 use interchange::ids::FaceId;
 use interchange::mesh::Mesh;
 use interchange::{Error, Result};
@@ -213,7 +214,12 @@ pub fn draw(path: &Path, output: &Path, only: Option<usize>) -> Result<()> {
                 .map_err(|error| Error::whole(output, format!("the picture cannot be encoded: {error}")))?;
             bytes
         }
-        _ => return Err(Error::whole(output, "expected a name ending in .svg or .png")),
+        _ => {
+            return Err({
+                let meant = meant_ending(output, ["svg", "png"]);
+                Error::whole(output, format!("expected a name ending in .svg or .png{meant}"))
+            });
+        }
     };
     interchange::atomic_write::write_bytes(output, &bytes).map(|_| ())
 }

@@ -91,6 +91,9 @@ fn every_format_is_written_and_others_are_refused() {
         assert!(said.contains(part), "{part:?} is not in: {said}");
     };
     fails(&["export", "s.mesh", "-o", "s.stl"], "must end in .ply, .vtu, .glb, .obj, .rad, .vs3");
+    fails(&["export", "s.mesh", "-o", "s.vtk"], "did you mean s.vtu?");
+    fails(&["import", "out.rad", "-o", "s.obi"], "did you mean s.obj?");
+    fails(&["picture", "s.mesh", "-o", "s.pgn"], "did you mean s.png?");
     fails(&["export", "s.mesh", "-o", "s.mesh"], "must end in");
     fails(&["import", "out.ply", "-o", "s.obj"], "must end in .vs3 (View3D) or .rad (Radiance)");
     fails(&["import", "out.rad", "-o", "s.rad"], "expected a name ending in .obj");

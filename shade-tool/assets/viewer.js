@@ -141,14 +141,17 @@
     const shown = isSmooth ? atPoints(values) : values;
     const items = shown.length / 3;
     const colours = new Uint8Array(3 * items);
-    const gain = Math.pow(2, Number(exposure.value)) / (Math.PI * record.white);
+    // As shade-tool's pictures are: the mean becomes middle grey, and what few surfaces are brighter than becomes white.
+    const gain = Math.pow(2, Number(exposure.value)) * record.gain;
+    const white = Math.max(1, gain * record.white);
+    const toned = (x) => x * (1 + x / (white * white)) / (1 + x);
     for (let i = 0; i < items; i++) {
       if (scale) {
         const part = (luminance(shown, i) - scale.low) / (scale.high - scale.low);
         const step = Math.round((record.colours.length - 1) * Math.min(1, Math.max(0, part)));
         colours.set(record.colours[step], 3 * i);
       } else {
-        for (let c = 0; c < 3; c++) colours[3 * i + c] = toByte(gain * shown[3 * i + c]);
+        for (let c = 0; c < 3; c++) colours[3 * i + c] = toByte(toned(gain / Math.PI * shown[3 * i + c]));
       }
     }
     const data = new Uint8Array(4 * vertex);

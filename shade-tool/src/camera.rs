@@ -416,8 +416,9 @@ mod tests {
         assert_eq!((side.eye.x, side.size, side.framing), (2.0, [40, 10], false));
         let moved = resolve(Wishes { eye: Some(DVec3::new(5.0, 0.0, 1.0)), ..Wishes::default() }).unwrap();
         assert_eq!(moved.forward, -DVec3::X);
-        let unknown = resolve(Wishes { name: Some("sied".into()), ..Wishes::default() });
-        assert!(unknown.unwrap_err().to_string().contains("front, side"));
+        let named = |name: &str| resolve(Wishes { name: Some(name.into()), ..Wishes::default() });
+        assert!(named("above").unwrap_err().to_string().contains("front, side"));
+        assert!(named("sied").unwrap_err().to_string().contains("did you mean side?"));
         assert!(Camera::resolve(&Wishes::default(), &[], bounds).unwrap().framing);
     }
 

@@ -4,6 +4,7 @@ use crate::judge::Scheme;
 use clap::ValueEnum;
 use glam::DVec3;
 use interchange::atomic_write::is_stdout;
+use interchange::error::meant_ending;
 use interchange::tool::positive;
 use std::path::{Path, PathBuf};
 
@@ -53,7 +54,7 @@ pub fn ends_in(ending: &'static str) -> impl Fn(&str) -> Result<PathBuf, String>
         if found.as_deref() == Some(ending) {
             Ok(path)
         } else {
-            Err(format!("the name must end in .{ending}"))
+            Err(format!("the name must end in .{ending}{}", meant_ending(&path, [ending])))
         }
     }
 }
@@ -66,7 +67,10 @@ pub fn table(endings: [&'static str; 2]) -> impl Fn(&str) -> Result<PathBuf, Str
             return Ok(path.into());
         }
         let fits = endings.iter().find_map(|ending| ends_in(ending)(text).ok());
-        fits.ok_or_else(|| format!("the name must end in .{} or .{}", endings[0], endings[1]))
+        fits.ok_or_else(|| {
+            let meant = meant_ending(path, endings);
+            format!("the name must end in .{} or .{}{meant}", endings[0], endings[1])
+        })
     }
 }
 

@@ -118,7 +118,8 @@ impl Tone {
         let factor = match exposure {
             Exposure::Stops(stops) => stops.exp2(),
             Exposure::Automatic(stops) => {
-                logarithmic_mean(picture).map_or(0.0, |mean| stops.exp2() * KEY / mean)
+                let pixels = picture.pixels.iter().map(|&p| (luminance(p), 1.0));
+                automatic_factor(pixels).map_or(0.0, |factor| stops.exp2() * factor)
             }
         };
         let mut highest: Vec<f64> = picture.pixels.iter().map(|p| p[0].max(p[1]).max(p[2])).collect();
@@ -144,14 +145,17 @@ impl Tone {
     }
 }
 
-/// exp of the mean logarithm of luminance over the lit pixels; `None` for a black picture.
-fn logarithmic_mean(picture: &Picture) -> Option<f64> {
-    let mut lit: Vec<f64> =
-        picture.pixels.iter().map(|&p| luminance(p)).filter(|&l| l > 0.0 && l.is_finite()).collect();
-    let mean = lit.iter().sum::<f64>() / lit.len() as f64;
-    lit.retain(|&l| l > TOO_DARK * mean);
-    let mean_logarithm = lit.iter().map(|l| l.ln()).sum::<f64>() / lit.len() as f64;
-    (!lit.is_empty()).then(|| mean_logarithm.exp())
+/// Factor on radiance that makes the logarithmic mean of what is lit middle grey. `parts`: luminances with the pixels or
+/// the area that each counts for.
+pub fn automatic_factor(parts: impl Iterator<Item = (f64, f64)>) -> Option<f64> {
+    let mut lit: Vec<(f64, f64)> = parts.filter(|&(l, _)| l > 0.0 && l.is_finite()).collect();
+    let mean_of = |lit: &[(f64, f64)], value: fn(f64) -> f64| {
+        lit.iter().map(|&(l, weight)| weight * value(l)).sum::<f64>()
+            / lit.iter().map(|&(_, weight)| weight).sum::<f64>()
+    };
+    let mean = mean_of(&lit, |l| l);
+    lit.retain(|&(l, _)| l > TOO_DARK * mean);
+    (!lit.is_empty()).then(|| KEY / mean_of(&lit, f64::ln).exp())
 }
 
 /// Encoding of IEC 61966-2-1.

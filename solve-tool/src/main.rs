@@ -2,6 +2,7 @@
 
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
+use interchange::error::meant_ending;
 use interchange::foreign::Format;
 use interchange::grouping::By;
 use interchange::tables::TableFormat;
@@ -231,7 +232,10 @@ fn run(command: Command) -> anyhow::Result<Finish> {
                 );
             }
             TableFormat::of(&output, &[TableFormat::Csv, TableFormat::Npy]).map_err(|_| {
-                let message = "the name must end in .csv or .npy (tables), or in .ply, .vtu, .glb, .obj or .rad (elements)";
+                let meant = meant_ending(&output, ["csv", "npy", "ply", "vtu", "glb", "obj", "rad"]);
+                let message = format!(
+                    "the name must end in .csv or .npy (tables), or in .ply, .vtu, .glb, .obj or .rad (elements){meant}"
+                );
                 interchange::Error::whole(&output, message)
             })?;
             let Some(by) = by else {

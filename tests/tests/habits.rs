@@ -94,6 +94,43 @@ fn a_dash_is_standard_output() {
     assert!(!folder.path().join("-").exists());
 }
 
+/// On a terminal what takes over a second says how much time is left, and what does not says nothing.
+#[test]
+#[cfg(unix)]
+fn a_bar_on_a_terminal_tells_the_time_left() {
+    // Runs a command on a terminal of its own and prints what it says there, until it ends or a bar is seen.
+    let script = "import os, pty, signal, sys
+child, terminal = pty.fork()
+if child == 0:
+    os.execvp(sys.argv[1], sys.argv[1:])
+said = b''
+while b' left' not in said:
+    try:
+        more = os.read(terminal, 4096)
+    except OSError:
+        break
+    if not more:
+        break
+    said += more
+else:
+    os.kill(child, signal.SIGINT)
+os.waitpid(child, 0)
+print(said.decode())";
+    let folder = tests::folder();
+    let scene = tests::root().join("tests/scenes/cornell_blocks.obj");
+    let build = ["--elements", "2000", "-o", "s.mesh"];
+    run(tool("mesh-tool").current_dir(folder.path()).arg("build").arg(scene).args(build)).expect_code(0);
+    let said = |name: &str, words: &str| {
+        let mut python = std::process::Command::new("python3");
+        python.current_dir(folder.path()).env("TERM", "xterm").args(["-c", script]);
+        run(python.arg(tests::program(name)).args(words.split(' '))).expect_code(0).stdout
+    };
+    let slow = said("formfactor-tool", "compute s.mesh -o s.ff --tolerance 1e-6");
+    assert!(slow.contains("form factors [") && slow.contains(" % ") && slow.contains(" left"), "{slow:?}");
+    let quick = said("mesh-tool", "info s.mesh");
+    assert!(quick.contains("elements") && !quick.contains(" left"), "{quick:?}");
+}
+
 /// Interrupted while it computes, a tool ends by the signal and leaves no unfinished file; the old output stays.
 #[test]
 #[cfg(unix)]

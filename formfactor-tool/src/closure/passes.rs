@@ -3,6 +3,7 @@
 
 use crate::block_sums::{Ends, add, terms_of};
 use interchange::matrix::{BlockView, MatrixWriter, Precision};
+use interchange::tool::progress;
 use rayon::prelude::*;
 
 /// Sums over the entries of a matrix that is being written.
@@ -89,6 +90,7 @@ impl<'a> Passes<'a> {
         let mut replaced =
             Replaced { sums: vec![0.0; self.count], changes: vec![0.0; self.count], largest_change: 0.0 };
         let clamped = &self.clamped;
+        let bar = progress("closed factors", self.writer.block_count());
         self.writer.replace(|views, bytes| {
             let replace = |view: &BlockView<'_>| {
                 let mut fresh = Fresh::of(view);
@@ -107,6 +109,7 @@ impl<'a> Passes<'a> {
                 });
                 fresh
             };
+            bar.inc(views.len() as u64);
             let parts: Vec<Fresh> = views.par_iter().map(replace).collect();
             for (view, fresh) in views.iter().zip(&parts) {
                 bytes.extend_from_slice(&fresh.bytes);

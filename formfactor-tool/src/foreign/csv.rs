@@ -5,6 +5,7 @@ use super::{RowSource, Table};
 use interchange::atomic_write::Outcome;
 use interchange::error::{Error, Result};
 use interchange::tables::{number, write_csv};
+use interchange::tool::progress;
 use std::path::Path;
 
 /// Writes a table.
@@ -57,7 +58,7 @@ pub fn read(path: &Path, text: &str, expected: usize) -> Result<Table> {
     let named = headed && cells == lines.len() + 1;
     let count = Table::check_square(path, lines.len(), cells - usize::from(named), expected)?;
     let mut table = Table::empty();
-    for (line, record) in lines {
+    for (line, record) in progress("read", lines.len()).wrap_iter(lines.iter()) {
         if record.len() != cells {
             let message = format!("found {} cells, expected {cells} as in the lines before", record.len());
             return Err(Error::scene(path, *line, message));

@@ -6,8 +6,12 @@ use super::{RowSource, Table};
 use interchange::atomic_write::{self, Outcome};
 use interchange::error::{Error, Result};
 use interchange::tables::number;
+use interchange::tool::progress;
 use std::io::SeekFrom;
 use std::path::Path;
+
+/// Entries between two looks at the bar, which cost as much as reading one.
+const ENTRIES_SHOWN: usize = 1 << 12;
 
 /// Writes the entries that are not zero. Their number is known at the end only; its place is kept free in the header.
 ///
@@ -67,7 +71,11 @@ pub fn read(path: &Path, text: &str, expected: usize) -> Result<Table> {
     };
     if layout == "coordinate" {
         let listed: usize = numbers.next("the number of entries")?;
-        for _ in 0..listed {
+        let bar = progress("read", listed);
+        for k in 0..listed {
+            if k % ENTRIES_SHOWN == 0 {
+                bar.set_position(k as u64);
+            }
             let [row, column] = [numbers.next::<usize>("a row")?, numbers.next::<usize>("a column")?];
             let value = numbers.next("a value")?;
             if !(1..=count).contains(&row) || !(1..=count).contains(&column) {

@@ -4,6 +4,7 @@ use super::{RowSource, Table};
 use interchange::atomic_write::Outcome;
 use interchange::error::{Error, Result};
 use interchange::tables::write_npy;
+use interchange::tool::progress;
 use npyz::{NpyFile, Order};
 use std::io::Read;
 use std::path::Path;
@@ -33,7 +34,7 @@ pub fn read(path: &Path, bytes: &[u8], expected: usize) -> Result<Table> {
     let order = file.order();
     let values = floats(path, file)?;
     let mut table = Table::empty();
-    for row in 0..count {
+    for row in progress("read", count).wrap_iter(0..count) {
         match order {
             Order::C => table.push_row(values[row * count..][..count].iter().copied()),
             Order::Fortran => table.push_row(values[row..].iter().step_by(count).copied()),

@@ -3,8 +3,12 @@
 use super::{RowSource, Table, npy, zip};
 use interchange::atomic_write::{self, Outcome};
 use interchange::error::{Error, Result};
+use interchange::tool::progress;
 use npyz::{AutoSerialize, DType, WriterBuilder};
 use std::path::Path;
+
+/// Values between two looks at the bar.
+const PART: usize = 1 << 16;
 
 /// Writes a table; its entries that are not zero are held in memory.
 ///
@@ -42,7 +46,9 @@ fn array<T: AutoSerialize + Copy>(values: &[T]) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let options = npyz::WriteOptions::new().default_dtype().shape(&[values.len() as u64]);
     let mut writer = options.writer(&mut bytes).begin_nd()?;
-    writer.extend(values.iter().copied())?;
+    let parts = values.chunks(PART);
+    let mut parts = progress("arrays", parts.len()).wrap_iter(parts);
+    parts.try_for_each(|part| writer.extend(part.iter().copied()))?;
     writer.finish()?;
     Ok(bytes)
 }

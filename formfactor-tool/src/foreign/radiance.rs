@@ -5,6 +5,7 @@ use super::table::Numbers;
 use super::{RowSource, Table};
 use interchange::atomic_write::{self, Outcome};
 use interchange::error::{Error, Result};
+use interchange::tool::progress;
 use std::path::Path;
 
 /// Components of one entry (colour channels) agree to this, in units of the largest: they are one number in f32.
@@ -82,7 +83,8 @@ pub fn read(path: &Path, bytes: &[u8], expected: usize) -> Result<Table> {
     };
     let largest = values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let mut table = Table::empty();
-    for (row, entries) in values.chunks_exact(count * components).enumerate() {
+    let rows = values.chunks_exact(count * components).enumerate();
+    for (row, entries) in progress("read", count).wrap_iter(rows) {
         for (column, entry) in entries.chunks_exact(components).enumerate() {
             if entry.iter().any(|x| (x - entry[0]).abs() > SAME_COMPONENTS * largest) {
                 let message = format!(

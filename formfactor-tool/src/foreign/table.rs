@@ -1,6 +1,7 @@
 //! A table of factors in memory, and what formats are written from.
 
 use interchange::error::{Error, Result};
+use interchange::tool::progress;
 use std::path::Path;
 
 /// Rows to be written, made as they are asked for.
@@ -57,7 +58,7 @@ impl Table {
         }
         let mut table = Self::empty();
         let mut next = 0;
-        for row in 0..count {
+        for row in progress("rows", count).wrap_iter(0..count) {
             while let Some(&(_, column, value)) = entries.get(next).filter(|entry| entry.0 as usize == row) {
                 if value != 0.0 {
                     table.columns.push(column);

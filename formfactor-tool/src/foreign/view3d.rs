@@ -5,6 +5,7 @@ use super::table::Numbers;
 use super::{RowSource, Table};
 use interchange::atomic_write::{self, Outcome};
 use interchange::error::{Error, Result};
+use interchange::tool::progress;
 use std::path::Path;
 
 /// Length that programs expect of the header line, without its end.
@@ -61,7 +62,7 @@ pub fn read(path: &Path, text: &str, expected: usize) -> Result<Table> {
     for _ in 0..count {
         table.areas.push(numbers.next("an area")?);
     }
-    for _ in 0..count {
+    for _ in progress("read", count).wrap_iter(0..count) {
         let mut row = Vec::new();
         for _ in 0..count {
             row.push(numbers.next("a factor")?);

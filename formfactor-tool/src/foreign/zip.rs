@@ -3,6 +3,7 @@
 
 use flate2::read::DeflateDecoder;
 use interchange::error::{Error, Result};
+use interchange::tool::progress;
 use std::io::{Read, Write};
 use std::path::Path;
 
@@ -19,6 +20,8 @@ const VERSION: u16 = 20;
 const DATE: u16 = 0x0021;
 const STORED: u16 = 0;
 const DEFLATED: u16 = 8;
+/// Bytes between two steps of the bar.
+const PART: usize = 1 << 20;
 
 /// The bytes of an archive; `None` where it would not fit 4 GiB.
 pub(super) fn write(out: &mut dyn Write, entries: &[(&str, Vec<u8>)]) -> std::io::Result<()> {
@@ -42,7 +45,8 @@ pub(super) fn write(out: &mut dyn Write, entries: &[(&str, Vec<u8>)]) -> std::io
         out.write_all(&LOCAL.to_le_bytes())?;
         out.write_all(&common)?;
         out.write_all(name.as_bytes())?;
-        out.write_all(content)?;
+        let parts = content.chunks(PART);
+        progress("write", parts.len()).wrap_iter(parts).try_for_each(|part| out.write_all(part))?;
         at += (LOCAL_LENGTH + name.len() + content.len()) as u64;
 
         central.extend_from_slice(&CENTRAL.to_le_bytes());

@@ -1,7 +1,7 @@
 //! Pixels, rectangles and text, and the PNG file they become.
 
 use interchange::atomic_write::{self, Outcome};
-use interchange::error::{Error, Result};
+use interchange::error::{Error, Result, meant_ending};
 use interchange::font;
 use std::path::Path;
 
@@ -71,7 +71,8 @@ impl Canvas {
     /// The name does not end in `.png`, or the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<Outcome> {
         if path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("png")) {
-            return Err(Error::whole(path, "expected a name ending in .png"));
+            let meant = meant_ending(path, ["png"]);
+            return Err(Error::whole(path, format!("expected a name ending in .png{meant}")));
         }
         let failed = |e: png::EncodingError| std::io::Error::other(e.to_string());
         atomic_write::write(path, |out| {

@@ -6,6 +6,7 @@ use super::scale::Scale;
 use interchange::error::Result;
 use interchange::font;
 use interchange::matrix::{BlockKind, Matrix};
+use interchange::tool::progress;
 use std::path::Path;
 
 /// Side of the square, pixels, at most.
@@ -49,7 +50,7 @@ pub fn picture(matrix: &Matrix) -> Result<Canvas> {
     let cells = count.div_ceil(bin);
 
     let (mut sums, mut stored) = (vec![0.0f64; cells * cells], vec![false; cells * cells]);
-    for view in &views {
+    for view in progress("picture", views.len()).wrap_iter(views.iter()) {
         view.for_each(|i, j, s| {
             let (row, column) = (i / bin, j / bin);
             sums[row * cells + column] += s / areas[i];

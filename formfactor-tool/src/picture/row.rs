@@ -7,7 +7,7 @@ use super::canvas::{Canvas, INK};
 use super::scale::Scale;
 use glam::DVec3;
 use interchange::atomic_write::refuse_input;
-use interchange::error::{Error, Result};
+use interchange::error::{Error, Result, meant_ending};
 use interchange::font;
 use interchange::foreign::{self, Field, Format, Surface};
 use interchange::matrix::Matrix;
@@ -62,7 +62,10 @@ pub fn draw(paths: &[impl AsRef<Path>], request: &Request<'_>, output: &Path) ->
     if !png && Format::of(output).is_none_or(|format| format == Format::Vs3) {
         return Err(Error::whole(
             output,
-            "the name must end in .png, .ply, .vtu, .glb, .obj or .rad, which says the format",
+            format!(
+                "the name must end in .png, .ply, .vtu, .glb, .obj or .rad, which says the format{}",
+                meant_ending(output, ["png", "ply", "vtu", "glb", "obj", "rad"])
+            ),
         ));
     }
     let (mesh, _, digest) = Mesh::read(request.mesh)?;

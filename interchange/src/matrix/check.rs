@@ -2,6 +2,7 @@
 
 use super::{Block, BlockKind, BlockView, MatrixRecord, PartFile, Values, views};
 use crate::error::{Error, Result};
+use crate::tool::progress;
 
 const UPDATE: &str = "this program is older than the file: update it";
 
@@ -14,15 +15,20 @@ pub(super) fn all_but_entries(file: &PartFile) -> Result<()> {
 
 /// Checks the entries of a file of which all else was checked.
 pub(super) fn entries(file: &PartFile) -> Result<()> {
-    for (i, view) in views(file.blocks()?, file.values()?, file.structure()?).enumerate() {
+    let blocks = file.blocks()?;
+    let bar = progress("entries", blocks.len());
+    for (i, view) in views(blocks, file.values()?, file.structure()?).enumerate() {
         structure(file, i, &view)?;
+        let bad = match view.values {
+            Values::F32(v) => v.iter().position(|&x| !usable(x.into())),
+            Values::F64(v) => v.iter().position(|&x| !usable(x)),
+        };
+        if let Some(at) = bad {
+            return Err(unusable(file, view.values.get(at), view.block.offset + at as u64));
+        }
+        bar.inc(1);
     }
-    let values = file.values()?;
-    let bad = match values {
-        Values::F32(v) => v.iter().position(|&x| !usable(x.into())),
-        Values::F64(v) => v.iter().position(|&x| !usable(x)),
-    };
-    bad.map_or(Ok(()), |at| Err(unusable(file, values.get(at), at as u64)))
+    Ok(())
 }
 
 /// Whether a number can be an entry, an error or a sum.

@@ -79,6 +79,11 @@ impl MatrixWriter {
         &self.blocks
     }
 
+    /// Number of blocks appended so far.
+    pub fn block_count(&self) -> usize {
+        self.blocks.len()
+    }
+
     /// Hands what was appended to the system, so that it survives this process.
     pub fn flush(&mut self) -> Result<()> {
         self.stream.flush()

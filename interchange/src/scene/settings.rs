@@ -12,6 +12,20 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 /// Keys the file may hold.
 const KEYS: [&str; 4] = ["camera", "two_sided", "units", "medium"];
 
+/// Keys of a camera, as [`CameraSettings`] has them.
+const CAMERA_KEYS: [&str; 10] = [
+    "name",
+    "eye",
+    "look_at",
+    "up",
+    "resolution",
+    "focal_length",
+    "film",
+    "fov_deg",
+    "projection",
+    "view_height",
+];
+
 /// Units of length that `units` may name.
 const UNITS: [&str; 9] = ["m", "km", "dm", "cm", "mm", "um", "in", "ft", "yd"];
 
@@ -175,6 +189,10 @@ impl Source<'_> {
         let mut lines_of_names: HashMap<String, usize> = HashMap::new();
         for table in tables {
             let at = Place { lines: self.lines_of_keys(&table), head: self.line(table.span().start) };
+            if let Some((line, found, near)) = at.misspelt() {
+                let message = format!("unknown key `{}` of a camera; did you mean `{near}`?", shown(found));
+                return Err(self.error(line, message));
+            }
             let camera: CameraSettings = self.value(table)?;
             camera_check::check(&camera).map_err(|(key, message)| self.error(at.line(key), message))?;
             if several {
@@ -211,6 +229,15 @@ impl Place {
     /// Line of `key`, or of the table's head if it is missing.
     fn line(&self, key: &str) -> usize {
         self.lines.iter().find(|(name, _)| name == key).map_or(self.head, |(_, line)| *line)
+    }
+
+    /// The first key that is none of a camera but near one: its line, itself, and that one.
+    fn misspelt(&self) -> Option<(usize, &str, &'static str)> {
+        let unknown = self.lines.iter().filter(|(name, _)| !CAMERA_KEYS.contains(&name.as_str()));
+        let mut near = unknown.filter_map(|(name, line)| {
+            nearest_name(name, CAMERA_KEYS.into_iter()).map(|near| (*line, name.as_str(), near))
+        });
+        near.next()
     }
 }
 

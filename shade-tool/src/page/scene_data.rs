@@ -5,6 +5,7 @@ use super::input::Input;
 use crate::camera::{Camera, Projection};
 use crate::colour_scale::{Scale, colour, label};
 use crate::picture::luminance;
+use crate::tone::automatic_factor;
 use glam::DVec3;
 use interchange::foreign::{Surface, base64};
 use interchange::ids::FaceId;
@@ -142,6 +143,7 @@ impl Drawn {
 
     fn record(&self, input: &Input, centre: DVec3, radius: f64) -> Value {
         let radiances: Vec<[f64; 3]> = self.radiosity.iter().map(|b| b.map(|x| x / PI)).collect();
+        let brightness = radiances.iter().map(|&l| luminance(l)).zip(self.areas.iter().copied());
         let irradiance: Vec<f64> = self.irradiance.iter().map(|&h| luminance(h)).collect();
         let mut paints = vec![paint("irradiance", "irradiance H, W m⁻²", &irradiance)];
         if let Some(errors) = &self.errors {
@@ -155,6 +157,7 @@ impl Drawn {
             "radius": radius,
             "unit": input.unit,
             "efficacy": input.efficacy,
+            "gain": automatic_factor(brightness).unwrap_or(0.0),
             "white": Surface::white(&radiances, &self.areas, SHARE_BELOW_WHITE),
             "luminance": weights,
             "groups": input.mesh.groups,

@@ -9,6 +9,7 @@ use crate::equation::Equation;
 use crate::part::Setup;
 use crate::product::Product;
 use crate::work::{End, Work};
+use interchange::tool::progress;
 use std::ops::ControlFlow;
 
 /// The factors of all channels.
@@ -103,7 +104,10 @@ fn row_start(row: usize) -> usize {
 
 /// Factors the packed lower triangle in place; false where a pivot is not positive.
 fn cholesky(lower: &mut [f64], n: usize) -> bool {
+    // The work up to row i grows with its cube.
+    let bar = progress("factorisation", n.saturating_pow(3));
     for i in 0..n {
+        bar.set_position(i.saturating_pow(3) as u64);
         let (above, row) = lower.split_at_mut(row_start(i));
         for j in 0..i {
             let other = &above[row_start(j)..=row_start(j) + j];

@@ -93,8 +93,8 @@ fn two_sided_materials_come_from_toml_and_argument() {
     assert_eq!(scene.materials.values.iter().map(|m| m.two_sided).collect::<Vec<_>>(), [1.0, 0.0, 1.0]);
     assert_eq!(scene.settings.two_sided, ["leaf"]);
     assert_eq!(
-        read_in(&folder, &["sial"]).unwrap_err(),
-        "s.obj: two-sided material sial was asked for, which no material file defines; \
+        read_in(&folder, &["cloth"]).unwrap_err(),
+        "s.obj: two-sided material cloth was asked for, which no material file defines; \
          there are leaf, sail, wall"
     );
     let toml = "\ntwo_sided = [\n  \"leaf\",\n  \"waal\",\n]\n";

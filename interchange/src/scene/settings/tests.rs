@@ -81,6 +81,8 @@ fn unknown_keys_are_refused_with_their_line() {
     assert_eq!(refusal("# cameras\n[camra]\neye = 1"), "2: unknown key `camra`; did you mean `camera`?");
     let strange = "1: unknown key `fog`; expected camera, two_sided or units";
     assert_eq!(refusal("fog = 1"), strange);
+    let misspelt = refusal_of("look_at", "lookat = [0, 0, 0]");
+    assert_eq!(misspelt, "3: unknown key `lookat` of a camera; did you mean `look_at`?");
     let message = refusal(&format!("{CAMERA}exposure = 2\n"));
     assert!(message.starts_with("7: unknown field `exposure`, expected one of `name`, `eye`"), "{message}");
 }
