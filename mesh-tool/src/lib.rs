@@ -10,7 +10,7 @@
 //!   or where a solution is worst ([`solved`]); [`conform`] makes planes meet, [`grading`] evens sizes.
 //!
 //! [`assemble`] leaves out what has no area ([`flat`]), numbers elements ([`cluster`]) and nodes ([`nodes`]); [`quality`]
-//! measures them; [`info`], [`look`] and [`picture`] show the result, [`mod@compare`] sets two beside each other, [`export`] hands
+//! measures them; [`info`], [`look`] and [`picture`] ([`unfold`]) show the result, [`mod@compare`] sets two beside each other, [`export`] hands
 //! one to other programs.
 //!
 //! # Limitations
@@ -70,6 +70,7 @@ pub mod solved;
 pub mod steps;
 pub mod strength;
 pub mod triangulation;
+pub mod unfold;
 pub mod wedge;
 
 pub use build::{Options, build, provenance};
