@@ -27,7 +27,7 @@ const TESTS: [[f64; 3]; 7] = [
 const INSIDE: f64 = 1e-6;
 /// No edge is halved to less than this part of the scene's diagonal: beside an emitter that touches a face, light has
 /// no bounded slope, and no mesh would do.
-const SHORTEST: f64 = 1.0 / 2048.0;
+pub const SHORTEST: f64 = 1.0 / 2048.0;
 /// Rounds end here at the latest: each halves edges.
 const ROUNDS: usize = 60;
 /// Triangles that one divided triangle adds at first guess.

@@ -3,19 +3,20 @@
 use crate::assemble::assemble;
 use crate::chosen::choose;
 use crate::clean::{Cleaned, Face, clean};
-use crate::conform;
 use crate::contact::Pieces;
 use crate::convex::pieces_of_polygon;
 use crate::discontinuity::{self, DrawnLine, Order};
 use crate::frame::Frame;
 use crate::given::as_given;
+use crate::grading::grade;
 use crate::light::Light;
 use crate::meshed::{Drawing, Drawn, Triangles};
 use crate::patch::Patch;
 use crate::quality::measure;
 use crate::regions::{LostEmitter, merged};
+use crate::search::area;
 use crate::sheets::{Layer, layers};
-use crate::sized::sized;
+use crate::sized::{graded, sized};
 use crate::solids::Solids;
 use crate::solved::{self, Solved};
 use crate::steps::{Off, Skip, Step};
@@ -187,9 +188,9 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
                     report.count("planes without lines of secondary sources", usize::from(drawn.is_err()));
                 }
             }
-            if off.leaves(Step::Meet) {
-                conform::meet(&drawings, &mut meshes, &cleaned.places);
-            }
+            let meets = off.leaves(Step::Meet).then_some(&cleaned.places);
+            let shortest = graded(options, area(&drawings));
+            grade(&drawings, &mut meshes, shortest, meets).map_err(fail)?;
             report.count("elements kept", kept(&base, &meshes));
         }
         patches = made(&meshes);

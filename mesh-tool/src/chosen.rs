@@ -9,8 +9,8 @@ use crate::clean::Cleaned;
 use crate::contact::Pieces;
 use crate::discontinuity::DrawnLine;
 use crate::meshed::{Drawing, Triangles};
-use crate::search::{Floor, Search};
-use crate::sized::{FLOOR, UNIFORM};
+use crate::search::{Floor, Search, area};
+use crate::sized::{FLOOR, UNIFORM, graded};
 use crate::steps::{Skip, Step};
 use crate::strength::{affordable, by_strength, first, nearness};
 use crate::triangulation::Trouble;
@@ -59,7 +59,15 @@ pub fn choose(
     let bare = draw(&[], 0.0)?;
     let max_edge = options.max_edge.unwrap_or(f64::INFINITY);
     let meets = options.no_clean.leaves(Step::Meet).then_some(&cleaned.places);
-    let search = Search { scene, drawings: &bare, max_edge, floor: Floor::Part(FLOOR), meets, name };
+    let search = Search {
+        scene,
+        drawings: &bare,
+        max_edge,
+        floor: Floor::Part(FLOOR),
+        graded: graded(options, area(&bare)),
+        meets,
+        name,
+    };
     let wanted = f64::from(elements);
     let (meshes, spacing) = search.counted(UNIFORM * wanted)?;
     let (least, floor) = (crate::search::count(&meshes) as f64, FLOOR * spacing);

@@ -206,6 +206,15 @@ fn mesh_page(path: &Path, mesh: &Mesh, provenance: &Provenance, digest: Digest) 
             quality.narrow_freely()
         );
     }
+    if quality.uneven > 0 {
+        let _ = writeln!(
+            page,
+            "uneven     {} pairs of neighbours differ in size by more than 2: {} in strips between lines or borders, {} others",
+            quality.uneven,
+            quality.uneven_in_strips,
+            quality.uneven - quality.uneven_in_strips
+        );
+    }
     page += &histogram("sizes      longest edge, parts of the extent: ", &size_histogram(mesh));
     let hidden: f64 = mesh.hidden_areas.iter().sum();
     if hidden > 0.0 {
@@ -302,6 +311,11 @@ fn mesh_json(mesh: &Mesh, provenance: &Provenance, digest: Digest) -> String {
             "at_given_angles": quality.narrow_at_given_angles,
             "in_strips": quality.narrow_in_strips,
             "others": quality.narrow_freely(),
+        },
+        "uneven_neighbours": {
+            "count": quality.uneven,
+            "in_strips": quality.uneven_in_strips,
+            "others": quality.uneven - quality.uneven_in_strips,
         },
         "materials": mesh.materials,
         "groups": groups,

@@ -7,14 +7,14 @@
 //! - [`discontinuity`] draws the lines of the light ([`features`], [`wedge`], [`eee`]), those that matter ([`strength`]),
 //! - [`meshed`] triangulates each plane as a whole ([`planar`], [`triangulation`], [`seeds`], [`refine`]),
 //! - [`sized`] finds the size: where light changes ([`light`], [`lit`]), where its interpolation asks for it ([`adaptive`]),
-//!   or where a solution is worst ([`solved`]); [`conform`] makes planes meet.
+//!   or where a solution is worst ([`solved`]); [`conform`] makes planes meet, [`grading`] evens sizes.
 //!
 //! [`assemble`] leaves out what has no area ([`flat`]), numbers elements ([`cluster`]) and nodes ([`nodes`]); [`quality`]
-//! measures them; [`info`], [`look`] and [`picture`] show the result, [`mod@compare`] sets two beside each other, [`export`] hands
+//! measures them; [`info`], [`look`] and [`picture`] ([`unfold`]) show the result, [`mod@compare`] sets two beside each other, [`export`] hands
 //! one to other programs.
 //!
 //! # Limitations
-//! With a number of elements as budget, shape yields to it: faces much narrower than the elements get narrow ones. Two
+//! With a number of elements as budget, shape and grading yield to it: faces much narrower than the elements get narrow ones. Two
 //! curvature lines may cross at a degree or less; angles between them are what they are. A body that touches itself or
 //! has a hole is not closed, and what lies in it counts as lit.
 
@@ -42,6 +42,7 @@ pub mod features;
 pub mod flat;
 pub mod frame;
 pub mod given;
+pub mod grading;
 pub mod hidden;
 pub mod info;
 pub mod light;
@@ -69,6 +70,7 @@ pub mod solved;
 pub mod steps;
 pub mod strength;
 pub mod triangulation;
+pub mod unfold;
 pub mod wedge;
 
 pub use build::{Options, build, provenance};

@@ -27,7 +27,7 @@ const ROUNDS: usize = 30;
 /// No more rounds when this part of the wished count is there: steps would be too small to matter.
 const ENOUGH: f64 = 0.97;
 /// No edge is halved to less than this part of that of as many equal triangles.
-const SHORTEST: f64 = 1.0 / 64.0;
+pub const SHORTEST: f64 = 1.0 / 64.0;
 /// Of a triangle to be made smaller all edges at least this part of the longest are halved: a strip stays one wide.
 pub const LONG: f64 = 0.6;
 /// Light below this part of the scene's mean counts like it.

@@ -60,8 +60,8 @@ enum Command {
         #[command(flatten)]
         size: SizeArgs,
     },
-    /// Draw the elements of every plane side by side; lines red where light jumps in value, orange in slope, blue in
-    /// curvature
+    /// Draw the elements with all planes unfolded about the edges they share; lines red where light jumps in value, orange in
+    /// slope, blue in curvature
     Picture {
         /// Mesh (.mesh)
         file: PathBuf,

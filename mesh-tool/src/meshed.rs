@@ -215,6 +215,15 @@ impl Drawing {
         Ok(true)
     }
 
+    /// Divides triangles beside much smaller ones, halving no edge to less than `shortest`, in units of length. `false` where there are none.
+    pub fn grade(&self, triangles: &mut Triangles, shortest: f64) -> Result<bool, Trouble> {
+        let mut refinement = triangles.refinement.clone();
+        let graded = refinement.grade(&triangles.triangulation, shortest / self.layer.frame.size)?;
+        let Some(triangulation) = graded else { return Ok(false) };
+        *triangles = self.owned(refinement, triangulation);
+        Ok(true)
+    }
+
     /// Draws more lines through a mesh; what they do not touch stays as it is.
     pub fn draw_more(
         &self,

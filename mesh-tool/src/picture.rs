@@ -1,6 +1,7 @@
-//! `mesh-tool picture`: the elements of every plane side by side, seen from where they look, with the discontinuity
-//! lines coloured by order: red where the value jumps, orange the slope, blue the curvature.
+//! `mesh-tool picture`: the elements of all planes, unfolded, seen from where they look, with the discontinuity lines
+//! coloured by order: red where the value jumps, orange the slope, blue the curvature.
 
+use crate::unfold::{Flat, Island, Motion, unfold};
 use geometry::plane::{PLANARITY, Plane};
 use geometry::polygon;
 use glam::{DVec2, DVec3};
@@ -13,11 +14,17 @@ use std::path::Path;
 
 /// Width of the picture, pixels or units of the SVG.
 const WIDTH: f64 = 1600.0;
-/// Space around each plane.
+/// Space around each island of planes.
 const MARGIN: f64 = 12.0;
 /// Colours: background, edges of elements, lines of order 0, 1, 2.
 const COLOURS: [[u8; 3]; 5] =
     [[255, 255, 255], [170, 170, 170], [215, 25, 28], [253, 141, 20], [44, 90, 200]];
+/// The picture is at most this many times as high as wide; islands are drawn smaller by steps until they fit.
+const TALLEST: f64 = 1.25;
+const SMALLER: f64 = 0.9;
+/// Largest and smallest size of captions; a letter is about half as wide as high.
+const LETTERS: [f64; 2] = [11.0, 2.0];
+const LETTER_WIDTH: f64 = 0.55;
 /// Normals of one plane agree to this, like the layers of meshing.
 const SAME_DIRECTION: f64 = 1e-4;
 
@@ -35,51 +42,99 @@ struct Sheet {
     size: f64,
     name: String,
     strokes: Vec<Stroke>,
-    low: DVec2,
-    high: DVec2,
+    flat: Flat,
 }
 
 /// A drawing: strokes in a frame `WIDTH` wide, captions.
 #[derive(Debug)]
 pub struct Picture {
     strokes: Vec<Stroke>,
-    captions: Vec<(DVec2, String)>,
+    captions: Vec<Caption>,
     height: f64,
+}
+
+/// The number and group of a plane, in its middle.
+#[derive(Debug)]
+struct Caption {
+    middle: DVec2,
+    size: f64,
+    text: String,
+}
+
+impl Caption {
+    fn within(low: DVec2, high: DVec2, text: String) -> Caption {
+        let widest = (high.x - low.x) / (LETTER_WIDTH * text.chars().count() as f64);
+        let size = widest.min(high.y - low.y).clamp(LETTERS[1], LETTERS[0]);
+        Caption { middle: 0.5 * (low + high), size, text }
+    }
+}
+
+/// Lower and upper corner of points.
+fn bounds_of(points: impl Iterator<Item = DVec2>) -> [DVec2; 2] {
+    points.fold([DVec2::INFINITY, DVec2::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
+}
+
+fn bounds(island: &Island, sheets: &[Sheet]) -> [DVec2; 2] {
+    let of = |(plane, motion): &(usize, Motion)| {
+        let motion = *motion;
+        sheets[*plane].flat.polygons.iter().flatten().map(move |&p| motion.of(p))
+    };
+    bounds_of(island.iter().flat_map(of))
+}
+
+/// Islands from left to right at one scale, a new row where the width is used up: scale, corner of each, height of all.
+fn shelves(extents: &[DVec2], widest: f64) -> (f64, Vec<DVec2>, f64) {
+    let mut scale = (WIDTH - 2.0 * MARGIN) / widest;
+    loop {
+        let (mut at, mut row, mut corners) = (DVec2::splat(MARGIN), 0.0f64, Vec::new());
+        for extent in extents.iter().map(|&extent| scale * extent) {
+            if at.x > MARGIN && at.x + extent.x + MARGIN > WIDTH {
+                at = DVec2::new(MARGIN, at.y + row + MARGIN);
+                row = 0.0;
+            }
+            corners.push(at);
+            at.x += extent.x + MARGIN;
+            row = row.max(extent.y);
+        }
+        let height = at.y + row + MARGIN;
+        // Many islands need their margins at least.
+        let least = 4.0 * MARGIN * MARGIN * extents.len() as f64 / WIDTH;
+        if height <= (TALLEST * WIDTH).max(least) {
+            return (scale, corners, height);
+        }
+        scale *= SMALLER;
+    }
 }
 
 impl Picture {
     /// Draws the planes of a mesh, or only the one with number `only` (from 1, as the captions count).
     pub fn new(mesh: &Mesh, only: Option<usize>) -> Option<Picture> {
         let sheets = sheets(mesh);
-        let chosen: Vec<(usize, &Sheet)> =
-            sheets.iter().enumerate().filter(|(k, _)| only.is_none_or(|n| n == k + 1)).collect();
-        let largest = chosen.iter().map(|(_, s)| (s.high - s.low).max_element()).fold(0.0, f64::max);
-        if chosen.is_empty() || largest <= 0.0 {
+        let islands: Vec<Island> = match only {
+            Some(number) => vec![vec![(number.checked_sub(1).filter(|&k| k < sheets.len())?, Motion::NONE)]],
+            None => unfold(&sheets.iter().map(|sheet| sheet.flat.clone()).collect::<Vec<_>>()),
+        };
+        let bounds: Vec<[DVec2; 2]> = islands.iter().map(|island| bounds(island, &sheets)).collect();
+        let widest = bounds.iter().map(|[low, high]| (high - low).max_element()).fold(0.0, f64::max);
+        if islands.is_empty() || widest <= 0.0 {
             return None;
         }
-        // Shelves: planes from left to right at one scale, a new row where the width is used up.
-        let columns = (chosen.len() as f64).sqrt().ceil().min(6.0);
-        let scale = (WIDTH / columns - 2.0 * MARGIN) / largest;
-        let mut picture = Picture { strokes: Vec::new(), captions: Vec::new(), height: MARGIN };
-        let (mut at, mut row) = (DVec2::splat(MARGIN), 0.0f64);
-        for (number, sheet) in chosen {
-            let extent = scale * (sheet.high - sheet.low);
-            if at.x + extent.x + MARGIN > WIDTH {
-                at = DVec2::new(MARGIN, at.y + row + 3.0 * MARGIN);
-                row = 0.0;
+        let extents: Vec<DVec2> = bounds.iter().map(|[low, high]| high - low).collect();
+        let (scale, corners, height) = shelves(&extents, widest);
+        let mut picture = Picture { strokes: Vec::new(), captions: Vec::new(), height };
+        for ((island, [low, high]), corner) in islands.iter().zip(bounds).zip(corners) {
+            for (number, motion) in island {
+                let sheet = &sheets[*number];
+                let place = |p: DVec2| {
+                    let p = motion.of(p);
+                    corner + scale * DVec2::new(p.x - low.x, high.y - p.y)
+                };
+                let strokes = sheet.strokes.iter();
+                picture.strokes.extend(strokes.map(|s| Stroke { ends: s.ends.map(place), colour: s.colour }));
+                let text = format!("{} {}", number + 1, sheet.name);
+                let [left, right] = bounds_of(sheet.flat.polygons.iter().flatten().map(|&p| place(p)));
+                picture.captions.push(Caption::within(left, right, text));
             }
-            let place = |p: DVec2| {
-                let p = scale * (p - sheet.low);
-                at + DVec2::new(p.x, extent.y - p.y)
-            };
-            picture
-                .strokes
-                .extend(sheet.strokes.iter().map(|s| Stroke { ends: s.ends.map(place), colour: s.colour }));
-            let caption = format!("{} {}", number + 1, sheet.name);
-            picture.captions.push((at + DVec2::new(0.0, extent.y + 1.2 * MARGIN), caption));
-            at.x += extent.x + 2.0 * MARGIN;
-            row = row.max(extent.y);
-            picture.height = at.y + row + 3.0 * MARGIN;
         }
         // Lines over edges.
         picture.strokes.sort_by_key(|stroke| if stroke.colour == 1 { 0 } else { 5 - stroke.colour });
@@ -105,12 +160,13 @@ impl Picture {
             }
             text += "\"/>\n";
         }
-        for (at, caption) in &self.captions {
+        for Caption { middle, size, text: caption } in &self.captions {
             let safe = caption.replace('&', "&amp;").replace('<', "&lt;");
             let _ = writeln!(
                 text,
-                "<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"11\" font-family=\"sans-serif\">{safe}</text>",
-                at.x, at.y
+                "<text x=\"{:.1}\" y=\"{:.1}\" font-size=\"{size:.1}\" font-family=\"sans-serif\" text-anchor=\"middle\" \
+                 dominant-baseline=\"middle\">{safe}</text>",
+                middle.x, middle.y
             );
         }
         text + "</svg>\n"
@@ -142,15 +198,17 @@ fn sheets(mesh: &Mesh) -> Vec<Sheet> {
         let corners = mesh.element_corners(element);
         let sheet = *sheet_of_face[face.index()][side]
             .get_or_insert_with(|| sheet_for(mesh, face, side, &mut sheets));
-        let flat: Vec<DVec2> = corners.iter().map(|&p| sheets[sheet].flat(p)).collect();
+        let flat: Vec<DVec2> = corners.iter().map(|&p| sheets[sheet].flatten(p)).collect();
         for (k, &a) in flat.iter().enumerate() {
             sheets[sheet].stroke(a, flat[(k + 1) % flat.len()], 1);
         }
+        sheets[sheet].flat.polygons.push(flat);
+        sheets[sheet].flat.vertices.push(mesh.elements.row(element.index()).iter().map(|v| v.0).collect());
     }
     for line in &mesh.lines {
         let ends = [line.from, line.to].map(|v| mesh.position(v));
         for sheet in sheet_of_face[line.face.index()].into_iter().flatten() {
-            let [a, b] = ends.map(|p| sheets[sheet].flat(p));
+            let [a, b] = ends.map(|p| sheets[sheet].flatten(p));
             sheets[sheet].stroke(a, b, 2 + line.order as usize);
         }
     }
@@ -171,13 +229,12 @@ fn sheet_for(mesh: &Mesh, face: FaceId, side: usize, sheets: &mut Vec<Sheet>) ->
         return known;
     }
     let name = mesh.groups[mesh.face_groups[face.index()].index()].clone();
-    let empty = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-    sheets.push(Sheet { plane, size, name, strokes: Vec::new(), low: empty.0, high: empty.1 });
+    sheets.push(Sheet { plane, size, name, strokes: Vec::new(), flat: Flat::default() });
     sheets.len() - 1
 }
 
 impl Sheet {
-    fn flat(&self, point: DVec3) -> DVec2 {
+    fn flatten(&self, point: DVec3) -> DVec2 {
         // Upright where the plane is: the second axis points up, or away where the plane is level.
         let normal = self.plane.normal;
         let up = if normal.y.abs() < 0.9 { DVec3::Y } else { DVec3::NEG_Z };
@@ -187,8 +244,6 @@ impl Sheet {
     }
 
     fn stroke(&mut self, a: DVec2, b: DVec2, colour: usize) {
-        self.low = self.low.min(a).min(b);
-        self.high = self.high.max(a).max(b);
         self.strokes.push(Stroke { ends: [a, b], colour });
     }
 }

@@ -24,6 +24,7 @@ pub fn measure(mesh: &Mesh, report: &mut Report) {
     report.count("elements below 25 deg in strips between lines or borders", quality.narrow_in_strips);
     report.count("elements below 25 deg that no line or border forces", quality.narrow_freely());
     report.count("neighbours of more than twice the size", quality.uneven);
+    report.count("neighbours of more than twice the size in strips", quality.uneven_in_strips);
 }
 
 /// Shape of the elements of a mesh.
@@ -48,6 +49,8 @@ pub struct Quality {
     pub narrow_in_strips: usize,
     /// Pairs of elements across an edge, the longest edge of one more than twice that of the other.
     pub uneven: usize,
+    /// Of these, pairs whose larger element has all corners on lines or borders.
+    pub uneven_in_strips: usize,
 }
 
 impl Quality {
@@ -66,26 +69,37 @@ impl Quality {
             })
             .sum();
         let lines: HashSet<(u32, u32)> = mesh.lines.iter().map(|l| sorted(l.from.0, l.to.0)).collect();
-        let mut sides: HashMap<(u32, u32, u32), Vec<f64>> = HashMap::new();
+        let mut sides: HashMap<(u32, u32, u32), Vec<usize>> = HashMap::new();
         let longest =
             |corners: &[DVec3]| polygon::edges(corners).map(|(a, b)| a.distance(b)).fold(0.0, f64::max);
-        for element in mesh.element_ids() {
-            let ring = mesh.elements.row(element.index());
-            let length = longest(&mesh.element_corners(element));
-            for (a, b) in edges_of(ring) {
-                let face = mesh.element_faces[element.index()].0;
-                sides.entry((face, a, b)).or_default().push(length);
+        // Both sides of a two-sided face have elements of their own.
+        let side_of = |element: usize| 2 * mesh.element_faces[element].0 + mesh.element_sides[element];
+        for element in mesh.element_ids().map(|element| element.index()) {
+            for (a, b) in edges_of(mesh.elements.row(element)) {
+                sides.entry((side_of(element), a, b)).or_default().push(element);
             }
         }
-        let uneven = sides.values().filter(|l| l.len() == 2 && l[0].max(l[1]) > 2.0 * l[0].min(l[1])).count();
         let (mut element_area, mut longest_edge, mut angles) = (0.0, 0.0f64, Vec::new());
         let given =
-            |face: u32, (a, b): (u32, u32)| lines.contains(&(a, b)) || sides[&(face, a, b)].len() == 1;
+            |side: u32, (a, b): (u32, u32)| lines.contains(&(a, b)) || sides[&(side, a, b)].len() == 1;
         let on_given: HashSet<(u32, u32)> = sides
             .keys()
             .filter(|&&(face, a, b)| given(face, (a, b)))
-            .flat_map(|&(face, a, b)| [(face, a), (face, b)])
+            .flat_map(|&(side, a, b)| [(side, a), (side, b)])
             .collect();
+        let all_on_given = |element: usize| {
+            mesh.elements.row(element).iter().all(|v| on_given.contains(&(side_of(element), v.0)))
+        };
+        let lengths: Vec<f64> = mesh.element_ids().map(|e| longest(&mesh.element_corners(e))).collect();
+        let (mut uneven, mut uneven_in_strips) = (0, 0);
+        for pair in sides.values().filter(|pair| pair.len() == 2) {
+            let (small, large) =
+                if lengths[pair[0]] < lengths[pair[1]] { (pair[0], pair[1]) } else { (pair[1], pair[0]) };
+            if lengths[large] > UNEVEN * lengths[small] {
+                uneven += 1;
+                uneven_in_strips += usize::from(all_on_given(large));
+            }
+        }
         let (mut narrow, mut narrow_at_given_angles, mut narrow_in_strips) = (0, 0, 0);
         for element in mesh.element_ids() {
             let corners = mesh.element_corners(element);
@@ -96,13 +110,13 @@ impl Quality {
             if angle.to_degrees() < NARROW_DEG {
                 narrow += 1;
                 let ring = mesh.elements.row(element.index());
-                let face = mesh.element_faces[element.index()].0;
+                let side = side_of(element.index());
                 let edges: Vec<(u32, u32)> = edges_of(ring).collect();
                 let before = (at + edges.len() - 1) % edges.len();
-                if given(face, edges[at]) && given(face, edges[before]) {
+                if given(side, edges[at]) && given(side, edges[before]) {
                     narrow_at_given_angles += 1;
                 } else {
-                    narrow_in_strips += usize::from(ring.iter().all(|v| on_given.contains(&(face, v.0))));
+                    narrow_in_strips += usize::from(all_on_given(element.index()));
                 }
             }
         }
@@ -117,12 +131,16 @@ impl Quality {
             narrow_at_given_angles,
             narrow_in_strips,
             uneven,
+            uneven_in_strips,
         }
     }
 }
 
 /// Elements with a smaller angle are narrow, degrees.
 const NARROW_DEG: f64 = 24.999_999;
+
+/// Neighbours differ in size when they do so by more than a factor 2 and rounding, which halved edges have.
+const UNEVEN: f64 = 2.0 * (1.0 + 1e-9);
 
 fn sorted(a: u32, b: u32) -> (u32, u32) {
     (a.min(b), a.max(b))

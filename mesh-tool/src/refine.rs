@@ -13,6 +13,7 @@ use glam::{DVec2, DVec3};
 use std::collections::BTreeSet;
 
 mod edits;
+mod grade;
 
 /// Triangles with a smaller angle are refined, in degrees. Ruppert's bound for termination is 20.7; the floor on the
 /// edge length ends the rest.

@@ -1,6 +1,6 @@
 //! The search for the spacing of triangles that gives the asked number of elements.
 
-use crate::conform;
+use crate::grading::grade;
 use crate::meshed::{Drawing, Triangles};
 use crate::places::Places;
 use crate::triangulation::Trouble;
@@ -34,6 +34,16 @@ pub fn count(meshes: &[Triangles]) -> usize {
     meshes.iter().map(Triangles::count).sum()
 }
 
+/// Area of all elements.
+pub fn area(drawings: &[Drawing]) -> f64 {
+    drawings.iter().map(|drawing| drawing.area).sum()
+}
+
+/// Spacing of so many equal triangles on this area.
+pub fn spacing(area: f64, count: f64) -> f64 {
+    (area / (EQUILATERAL * count)).sqrt()
+}
+
 /// The search for the spacing of a uniform mesh.
 #[derive(Debug, Clone, Copy)]
 pub struct Search<'a, Name> {
@@ -45,6 +55,8 @@ pub struct Search<'a, Name> {
     pub max_edge: f64,
     /// No edge is made shorter for the sake of shape.
     pub floor: Floor,
+    /// Sizes are graded, halving no edge to less than this, in units of length; `None`: not at all.
+    pub graded: Option<f64>,
     /// The scene's corners, where planes are to meet.
     pub meets: Option<&'a Places>,
     /// Names the face of an error.
@@ -77,14 +89,15 @@ impl<Name: Fn(u32, Trouble) -> Error + Sync> Search<'_, Name> {
                 mesh.map_err(|trouble| (self.name)(drawing.layer().sheets[0].face, trouble))
             })
             .collect::<Result<_>>()?;
-        self.meet(&mut meshes);
+        self.settle(&mut meshes)?;
         let count = count(&meshes) as f64;
         Ok((meshes, count))
     }
 
-    /// Makes planes meet; returns how many could not.
-    pub fn meet(&self, meshes: &mut [Triangles]) -> usize {
-        self.meets.map_or(0, |places| conform::meet(self.drawings, meshes, places))
+    /// Grades sizes and makes planes meet; returns how many could not.
+    pub fn settle(&self, meshes: &mut [Triangles]) -> Result<usize> {
+        grade(self.drawings, meshes, self.graded, self.meets)
+            .map_err(|(layer, trouble)| (self.name)(self.drawings[layer].layer().sheets[0].face, trouble))
     }
 
     /// Extent of the largest layer.
@@ -94,14 +107,14 @@ impl<Name: Fn(u32, Trouble) -> Error + Sync> Search<'_, Name> {
 
     /// Area of all elements.
     pub fn area(&self) -> f64 {
-        self.drawings.iter().map(|drawing| drawing.area).sum()
+        area(self.drawings)
     }
 
     /// Triangles of one spacing, about `wanted`, and the spacing.
     pub fn counted(&self, wanted: f64) -> Result<(Vec<Triangles>, f64)> {
         let widest = SPACING_PER_MAX_EDGE * self.max_edge;
         // The count goes with the inverse square of the spacing, apart from what the faces need at least.
-        let mut spacing = (self.area() / (EQUILATERAL * wanted)).sqrt().min(widest);
+        let mut spacing = spacing(self.area(), wanted).min(widest);
         let (mut meshes, mut count) = self.mesh(spacing)?;
         let mut best = spacing;
         let mut bracket = (0.0, f64::INFINITY);

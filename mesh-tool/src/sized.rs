@@ -8,9 +8,9 @@ use crate::lit;
 use crate::meshed::Triangles;
 use crate::places::Places;
 use crate::search::{
-    COUNT_TOLERANCE, EQUILATERAL, Floor, MOST_ELEMENTS, SPACING_PER_MAX_EDGE, Search, count,
+    COUNT_TOLERANCE, Floor, MOST_ELEMENTS, SPACING_PER_MAX_EDGE, Search, area, count, spacing,
 };
-use crate::steps::Step;
+use crate::steps::{Skip, Step};
 use crate::triangulation::Trouble;
 use interchange::report::Report;
 use interchange::scene::Scene;
@@ -33,6 +33,18 @@ const COARSE: f64 = 80.0;
 /// This part of the elements makes a uniform mesh; the others go where light changes.
 pub const UNIFORM: f64 = 0.35;
 
+/// The length below which no edge is halved for the sake of even sizes, where the elements cover this area: light or shape
+/// would not either. `None` where a number of elements is asked for: even sizes would take several times that number in strips
+/// between lines or borders (BENCHMARKING.md).
+pub fn graded(options: &Options, area: f64) -> Option<f64> {
+    match (options.elements, options.max_edge) {
+        (Some(_), _) if options.no_skip.leaves(Skip::Grading) => None,
+        (Some(wanted), _) => Some(lit::SHORTEST * spacing(area, f64::from(wanted))),
+        (None, Some(length)) => Some(FINE_FLOOR * SPACING_PER_MAX_EDGE * length),
+        (None, None) => Some(adaptive::SHORTEST * area.sqrt()),
+    }
+}
+
 /// Meshes all layers as the options ask: with `light`, smaller where it changes.
 pub fn sized(
     scene: &Scene,
@@ -49,24 +61,25 @@ pub fn sized(
     // A number of elements is a budget: shape yields to it. A length alone is none.
     let floor = Floor::Part(if options.elements.is_some() { FLOOR } else { FINE_FLOOR });
     let meets = options.no_clean.leaves(Step::Meet).then_some(places);
-    let search = Search { scene, drawings, max_edge, floor, meets, name };
+    let graded = graded(options, area(drawings));
+    let search = Search { scene, drawings, max_edge, floor, graded, meets, name };
     if let (Some(light), Some(asked)) = (light, options.tolerance) {
         let most = options.elements.map_or(MOST_ELEMENTS, f64::from);
         // Start coarse: what is evenly lit stays so.
-        let coarse = (search.area() / (EQUILATERAL * COARSE)).sqrt().min(SPACING_PER_MAX_EDGE * max_edge);
+        let coarse = spacing(search.area(), COARSE).min(SPACING_PER_MAX_EDGE * max_edge);
         let mut meshes = search.mesh(coarse)?.0;
         let diagonal = search.diagonal();
         let wish = adaptive::Wish { tolerance: asked, most, linear: options.linear, diagonal };
         adaptive::refine(light, drawings, &mut meshes, wish, report)
             .map_err(|(layer, trouble)| name(drawings[layer].layer().sheets[0].face, trouble))?;
-        report.count("planes that do not meet others everywhere", search.meet(&mut meshes));
+        report.count("planes that do not meet others everywhere", search.settle(&mut meshes)?);
         return Ok(meshes);
     }
     let Some(wanted) = options.elements.map(f64::from) else {
         return Ok(search.mesh(SPACING_PER_MAX_EDGE * max_edge)?.0);
     };
     if let Some(light) = light {
-        let spacing = (search.area() / (EQUILATERAL * wanted)).sqrt();
+        let spacing = spacing(search.area(), wanted);
         let start = match start {
             Some(meshes) => meshes,
             None => search.counted(UNIFORM * wanted)?.0,
@@ -79,7 +92,7 @@ pub fn sized(
             let mut meshes = start.clone();
             lit::refine(light, drawings, &mut meshes, aim, spacing, report)
                 .map_err(|(layer, trouble)| name(drawings[layer].layer().sheets[0].face, trouble))?;
-            report.count("planes that do not meet others everywhere", search.meet(&mut meshes));
+            report.count("planes that do not meet others everywhere", search.settle(&mut meshes)?);
             let found = count(&meshes) as f64;
             // Where light changes nowhere, only a uniform mesh can use up the rest.
             if found < (1.0 - REFINED_TOLERANCE) * wanted {

@@ -42,6 +42,8 @@ pub enum Skip {
     Budget,
     /// Lines that pass each other or a border more closely than elements can follow are led through what is there
     Near,
+    /// With a number of elements as budget, neighbours in strips between lines or borders may differ in size by any factor
+    Grading,
 }
 
 /// A set of names that were switched off.

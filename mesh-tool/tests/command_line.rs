@@ -180,6 +180,15 @@ fn pictures_are_drawn_and_planes_chosen() {
     let svg = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
     assert_eq!((svg("s.svg").matches("<text").count(), svg("one.svg").matches("<text").count()), (6, 1));
     assert!(std::fs::read(folder.join("s.png")).unwrap().starts_with(b"\x89PNG"));
+    // A cross three squares wide and four high in a frame of 1600 with a margin of 12; one square that fills another.
+    let extent = |name: &str| {
+        let svg = svg(name);
+        let points = svg.lines().filter_map(|line| line.strip_prefix('M')).flat_map(|line| line.split('L'));
+        let at = |point: &str| point.split_once(' ').map(|(x, y)| [x, y].map(|v| v.parse::<f64>().unwrap()));
+        points.map(|point| at(point).unwrap()).fold([0.0f64; 2], |[x, y], [u, v]| [x.max(u), y.max(v)])
+    };
+    assert_eq!(extent("s.svg"), [12.0 + 0.75 * 1576.0, 12.0 + 1576.0]);
+    assert_eq!(extent("one.svg"), [12.0 + 1576.0; 2]);
     for flags in [&["-o", "s.gif"][..], &["-o", "t.svg", "--plane", "7"], &["-o", "s.mesh"]] {
         let output = tool(&folder).args(["picture", "s.mesh"]).args(flags).output().unwrap();
         assert_eq!(output.status.code(), Some(1), "{flags:?}");

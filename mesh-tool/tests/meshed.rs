@@ -63,6 +63,16 @@ fn lines_of_a_furnished_room_add_few_narrow_elements() {
     assert!(free < 350, "{free}");
 }
 
+/// A length is no budget: beside small elements there is nothing more than twice as large, whatever forces them to be small.
+#[test]
+fn neighbours_in_a_furnished_room_differ_in_size_by_a_factor_two_at_most() {
+    let options = Options { max_edge: Some(0.3), ..Options::default() };
+    let (mesh, report) = made(&read("room.obj"), options);
+    assert_eq!(report.counters["neighbours of more than twice the size"], 0);
+    // 85581 before they were graded.
+    assert!(mesh.element_count() < 86_500, "{}", mesh.element_count());
+}
+
 #[test]
 fn floor_is_parted_along_the_feet_of_the_blocks() {
     let (mesh, report) = made(&read("cornell_blocks.obj"), elements(2000));
