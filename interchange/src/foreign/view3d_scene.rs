@@ -26,10 +26,11 @@ pub fn read(path: &Path) -> Result<(Surface, Vec<String>)> {
         let Some(kind) = line.words.first().and_then(|word| word.chars().next()) else { continue };
         match kind.to_ascii_uppercase() {
             '!' | '/' => {}
-            'T' => scene
-                .surface
-                .comments
-                .push(text.lines().nth(number).unwrap_or_default()[1..].trim().to_owned()),
+            // What follows the letter. Blanks of any alphabet may stand before it.
+            'T' => {
+                let title = text.lines().nth(number).unwrap_or_default().trim_start();
+                scene.surface.comments.push(title.get(1..).unwrap_or_default().trim().to_owned());
+            }
             'F' => scene.format(&line)?,
             'C' => {
                 let control = line.words[1..].join(" ").to_lowercase().replace(' ', "");
@@ -192,6 +193,14 @@ mod tests {
         let path = folder.path().join("s.vs3");
         std::fs::write(&path, text).unwrap();
         read(&path)
+    }
+
+    /// Found by fuzzing: a blank of two bytes before the letter.
+    #[test]
+    fn titles_stand_behind_blanks_of_any_alphabet() {
+        let lines = "\u{a0}T a room\nT\nF 3\nV 1 0 0 0\nV 2 1 0 0\nV 3 0 1 0\nS 1 1 2 3 0 0 0 0.5 floor\nE\n";
+        let (found, _) = parsed(lines).unwrap();
+        assert_eq!(found.comments, ["a room", ""]);
     }
 
     #[test]
