@@ -51,7 +51,7 @@ mod tests {
     use crate::visible::VisibleSurface;
     use glam::DVec3;
 
-    /// A square of 2 x 2 elements that fills the middle of the picture: each reaches over half of it.
+    /// A square of 2 x 2 elements in the middle of the picture, two pixels to a unit: each reaches over four pixels.
     #[test]
     fn facets_reach_from_their_first_to_their_last_pixel() {
         let mut mesh = empty_mesh();
