@@ -139,7 +139,7 @@ struct SizeArgs {
     /// Mesh with triangles whose edges are no longer than this, in the scene's unit of length
     #[arg(long, value_name = "L", value_parser = tool::positive)]
     max_edge: Option<f64>,
-    /// Mesh with about this many triangles, smaller where light changes; with --max-edge too, the finer of the two wins
+    /// Mesh with about this many triangles, smaller where light changes; at least a quarter more than the faces need by themselves. With --max-edge too, the finer of the two wins
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     elements: Option<u32>,
     /// With --elements: triangles of equal size, whatever the light
