@@ -14,6 +14,7 @@ use crate::skips::{Skip, Skips};
 use crate::store::{Packing, Store, StoredTile};
 use crate::traversal::leaf_pairs;
 use interchange::atomic_write::refuse_input;
+use interchange::counted::counted;
 use interchange::digest::Digest;
 use interchange::matrix::{Block, BlockKind, MatrixRecord};
 use interchange::mesh::Mesh;
@@ -120,7 +121,8 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
                 report.phase("resume", || store.replay(leftover, &pairs, &run))?;
             if damaged {
                 report.warn(format!(
-                    "the journal of the killed run is cut short or damaged after {tiles} tiles: the others are computed anew"
+                    "the journal of the killed run is cut short or damaged after {}: the others are computed anew",
+                    counted(tiles, "tile", "tiles")
                 ));
             }
             (journal, tiles)

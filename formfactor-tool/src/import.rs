@@ -14,6 +14,7 @@ use anyhow::Context;
 use clap::{Args, ValueEnum};
 use geometry::polygon;
 use interchange::atomic_write::{Partial, refuse_input};
+use interchange::counted::counted;
 use interchange::error::Error;
 use interchange::grouping::{By, Grouping};
 use interchange::matrix::{MatrixRecord, PackedBlock, Precision};
@@ -242,7 +243,8 @@ fn check_areas(given: &[f64], keys: &[u32], areas: &[f64], report: &mut Report) 
     let count = (0..areas.len()).filter(differs).count();
     if let Some(element) = (0..areas.len()).find(differs) {
         report.warn(format!(
-            "{count} areas in the table differ from those of the mesh, first at element {}: {:?} and {}; are rows and elements in the same order?",
+            "{} of the mesh, first at element {}: {:?} and {}; are rows and elements in the same order?",
+            counted(count, "area in the table differs from that", "areas in the table differ from those"),
             element + 1,
             of(element),
             areas[element]
@@ -354,8 +356,8 @@ impl Findings {
         let (row, sum) = self.largest_sum;
         if self.above_one > 0 {
             report.warn(format!(
-                "{} rows sum up to more than 1, most that of element {}: {sum:.6}; more cannot leave an element than it sends",
-                self.above_one,
+                "{} up to more than 1, most that of element {}: {sum:.6}; more cannot leave an element than it sends",
+                counted(self.above_one, "row sums", "rows sum"),
                 row + 1
             ));
         }
@@ -374,12 +376,14 @@ impl Findings {
             ));
         }
         if self.to_itself > 0 {
-            report.warn(format!("{} elements see themselves, which no plane element does", self.to_itself));
+            let those = counted(self.to_itself, "element sees itself", "elements see themselves");
+            report.warn(format!("{those}, which no plane element does"));
         }
         if self.strangers > 0 {
-            report.warn(format!(
-                "{} rows or entries belong to faces without an element and were left out",
-                self.strangers
+            report.warn(counted(
+                self.strangers,
+                "row or entry belongs to a face without an element and was left out",
+                "rows or entries belong to faces without an element and were left out",
             ));
         }
     }
