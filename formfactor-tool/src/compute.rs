@@ -13,7 +13,7 @@ use crate::shards;
 use crate::skips::{Skip, Skips};
 use crate::store::{Packing, Store, StoredTile};
 use crate::traversal::leaf_pairs;
-use interchange::atomic_write::refuse_input;
+use interchange::atomic_write::{refuse_input, refuse_stdout};
 use interchange::counted::counted;
 use interchange::digest::Digest;
 use interchange::matrix::{Block, BlockKind, MatrixRecord};
@@ -45,6 +45,7 @@ pub struct Request {
 /// Computes the matrix of a mesh and writes it with its report.
 pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     let old_files = request.reuse.reuse.iter().chain(&request.reuse.reuse_mesh);
+    refuse_stdout(&request.output)?;
     refuse_input(&request.output, std::iter::once(&request.mesh).chain(old_files).map(PathBuf::as_path))?;
     let tolerance = request.tolerance;
     let skips = Skips::without(&request.no_skip);

@@ -13,7 +13,7 @@ use crate::store::Store;
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use geometry::polygon;
-use interchange::atomic_write::{Partial, refuse_input};
+use interchange::atomic_write::{Partial, refuse_input, refuse_stdout};
 use interchange::counted::counted;
 use interchange::error::Error;
 use interchange::grouping::{By, Grouping};
@@ -90,6 +90,7 @@ pub struct Request {
 /// written.
 pub fn run(request: &Request) -> anyhow::Result<Finish> {
     let Request { table: table_path, mesh: mesh_path, output, wishes } = request;
+    refuse_stdout(output)?;
     refuse_input(output, [table_path.as_path(), mesh_path.as_path()])?;
     let mut report = Report::new("formfactor-tool", env!("CARGO_PKG_VERSION"));
     let (mesh, _, digest) = Mesh::read(mesh_path)?;
