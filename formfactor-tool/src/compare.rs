@@ -4,6 +4,7 @@
 use crate::export::Factors;
 use crate::info::Spread;
 use anyhow::bail;
+use interchange::counted::counted;
 use interchange::error::{Error, Result};
 use interchange::grouping::Grouping;
 use interchange::ids::ElementId;
@@ -208,7 +209,13 @@ impl Difference {
             let both = format!("{:.6e} and {:.6e}", entry.first, entry.second);
             line(name, format!("{value:.6e} at most: {both}, from {places}"));
         }
-        line("accounted", format!("{share:.3} of the stated row errors at most; {beyond} rows beyond them"));
+        line(
+            "accounted",
+            format!(
+                "{share:.3} of the stated row errors at most; {} beyond them",
+                counted(beyond, "row", "rows")
+            ),
+        );
         for (name, side) in ["first", "second"].iter().zip(&self.sides) {
             line(name, format!("{} ({})", side.path().display(), side.digest().short()));
             line(

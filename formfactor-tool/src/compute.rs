@@ -13,7 +13,8 @@ use crate::shards;
 use crate::skips::{Skip, Skips};
 use crate::store::{Packing, Store, StoredTile};
 use crate::traversal::leaf_pairs;
-use interchange::atomic_write::refuse_input;
+use interchange::atomic_write::{refuse_input, refuse_stdout};
+use interchange::counted::counted;
 use interchange::digest::Digest;
 use interchange::matrix::{Block, BlockKind, MatrixRecord};
 use interchange::mesh::Mesh;
@@ -44,6 +45,7 @@ pub struct Request {
 /// Computes the matrix of a mesh and writes it with its report.
 pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
     let old_files = request.reuse.reuse.iter().chain(&request.reuse.reuse_mesh);
+    refuse_stdout(&request.output)?;
     refuse_input(&request.output, std::iter::once(&request.mesh).chain(old_files).map(PathBuf::as_path))?;
     let tolerance = request.tolerance;
     let skips = Skips::without(&request.no_skip);
@@ -120,7 +122,8 @@ pub fn run(request: &Request, common: &Common) -> anyhow::Result<Finish> {
                 report.phase("resume", || store.replay(leftover, &pairs, &run))?;
             if damaged {
                 report.warn(format!(
-                    "the journal of the killed run is cut short or damaged after {tiles} tiles: the others are computed anew"
+                    "the journal of the killed run is cut short or damaged after {}: the others are computed anew",
+                    counted(tiles, "tile", "tiles")
                 ));
             }
             (journal, tiles)

@@ -25,8 +25,14 @@ pub use table::{RowSource, Table};
 
 use clap::ValueEnum;
 use interchange::atomic_write::is_stdout;
+use interchange::digest::Digest;
 use interchange::error::{Error, Result, meant_ending};
+use interchange::tool::progress;
+use std::io::Read;
 use std::path::Path;
+
+/// Bytes between two steps of the bar.
+const PART: u64 = 1 << 24;
 
 /// How a table of factors is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -77,22 +83,40 @@ impl Format {
     }
 }
 
-/// Reads a table of `expected` rows and columns, whose format its first bytes tell.
+/// Reads a table of `expected` rows and columns, whose format its first bytes tell, and the digest of its file.
 ///
 /// # Errors
 /// What was found and what was expected, with line or place.
-pub fn read(path: &Path, expected: usize) -> Result<Table> {
-    let bytes = std::fs::read(path).map_err(|e| Error::io(path, "read", e))?;
+pub fn read(path: &Path, expected: usize) -> Result<(Table, Digest)> {
+    let bytes = read_shown(path).map_err(|e| Error::io(path, "read", e))?;
+    // The digest of a long file takes as long as reading it does: both at once.
+    let (table, digest) = rayon::join(|| parse(path, &bytes, expected), || Digest::of(&bytes));
+    Ok((table?, digest))
+}
+
+/// The bytes of a file, with a bar while they come.
+fn read_shown(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut file = std::fs::File::open(path)?;
+    let length = file.metadata()?.len();
+    let bar = progress("file", (length / PART + 1) as usize);
+    let mut bytes = Vec::with_capacity(usize::try_from(length).unwrap_or(0));
+    while file.by_ref().take(PART).read_to_end(&mut bytes)? > 0 {
+        bar.inc(1);
+    }
+    Ok(bytes)
+}
+
+fn parse(path: &Path, bytes: &[u8], expected: usize) -> Result<Table> {
     if bytes.starts_with(b"\x93NUMPY") {
-        return npy::read(path, &bytes, expected);
+        return npy::read(path, bytes, expected);
     }
     if bytes.starts_with(b"PK") {
-        return npz::read(path, &bytes, expected);
+        return npz::read(path, bytes, expected);
     }
     if bytes.starts_with(b"#?") {
-        return radiance::read(path, &bytes, expected);
+        return radiance::read(path, bytes, expected);
     }
-    let text = std::str::from_utf8(&bytes).map_err(|_| {
+    let text = std::str::from_utf8(bytes).map_err(|_| {
         Error::whole(
             path,
             "found neither text nor npy, npz or a Radiance matrix; see formfactor-tool import --help",

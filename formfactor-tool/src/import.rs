@@ -13,8 +13,8 @@ use crate::store::Store;
 use anyhow::Context;
 use clap::{Args, ValueEnum};
 use geometry::polygon;
-use interchange::atomic_write::{Partial, refuse_input};
-use interchange::digest::Digest;
+use interchange::atomic_write::{Partial, refuse_input, refuse_stdout};
+use interchange::counted::counted;
 use interchange::error::Error;
 use interchange::grouping::{By, Grouping};
 use interchange::matrix::{MatrixRecord, PackedBlock, Precision};
@@ -90,6 +90,7 @@ pub struct Request {
 /// written.
 pub fn run(request: &Request) -> anyhow::Result<Finish> {
     let Request { table: table_path, mesh: mesh_path, output, wishes } = request;
+    refuse_stdout(output)?;
     refuse_input(output, [table_path.as_path(), mesh_path.as_path()])?;
     let mut report = Report::new("formfactor-tool", env!("CARGO_PKG_VERSION"));
     let (mesh, _, digest) = Mesh::read(mesh_path)?;
@@ -98,13 +99,14 @@ pub fn run(request: &Request) -> anyhow::Result<Finish> {
         Rows::Element => mesh.element_count(),
         Rows::Face => mesh.input_face_count as usize,
     };
-    let table = report.phase("read", || foreign::read(table_path, expected))?;
+    let (table, table_digest) = report.phase("read", || foreign::read(table_path, expected))?;
     let areas: Vec<f64> =
         mesh.element_ids().map(|element| polygon::area(&mesh.element_corners(element))).collect();
-    let factors = Imported { table: &table, keys: &keys, areas: &areas };
-    factors.check_entries(table_path)?;
-    factors.check_areas(&mut report);
+    check_entries(&table, table_path)?;
+    check_areas(&table.areas, &keys, &areas, &mut report);
     let stated = wishes.tolerance.unwrap_or(0.0);
+    let (table, strangers) = table.of_elements(&keys);
+    let factors = Imported { table: &table, areas: &areas, strangers };
     let findings = report.phase("check", || factors.findings(stated));
     findings.say(&mut report, wishes.reciprocity);
 
@@ -117,15 +119,13 @@ pub fn run(request: &Request) -> anyhow::Result<Finish> {
         PrecisionName::F64 => Precision::F64,
     };
     report.flags = flags(wishes);
-    let read = std::fs::read(table_path).map_err(|e| Error::io(table_path, "read", e))?;
     let origin = report
         .flags
         .iter()
         .fold(Provenance::new("formfactor-tool", env!("CARGO_PKG_VERSION")), |origin, flag| {
             origin.flag(flag.as_str())
         });
-    let origin = origin.input("mesh", digest).input("factors", Digest::of(&read));
-    drop(read);
+    let origin = origin.input("mesh", digest).input("factors", table_digest);
     let tolerance = wishes.tolerance.unwrap_or(found);
     let record = MatrixRecord {
         elements: areas.len() as u32,
@@ -192,12 +192,12 @@ fn keys(mesh: &Mesh, path: &Path, by: Rows) -> anyhow::Result<Vec<u32>> {
     Ok(keys)
 }
 
-/// Factors of a table between the elements of a mesh.
+/// Factors between the elements of a mesh.
 struct Imported<'a> {
     table: &'a Table,
-    /// Row of the table for each element.
-    keys: &'a [u32],
     areas: &'a [f64],
+    /// Rows and entries of the file that belong to no element and are not zero.
+    strangers: usize,
 }
 
 /// What is wrong with the factors.
@@ -214,54 +214,48 @@ struct Findings {
     above_one: usize,
     /// Elements that see themselves.
     to_itself: usize,
-    /// Rows of the table that belong to no element and are not zero.
+    /// As [`Imported::strangers`].
     strangers: usize,
 }
 
+fn check_entries(table: &Table, path: &Path) -> anyhow::Result<()> {
+    for row in 0..table.count() {
+        let (columns, values) = table.row(row);
+        let wrong = values.iter().position(|x| !(x.is_finite() && *x >= 0.0));
+        if let Some(k) = wrong {
+            let message = format!(
+                "row {}, column {}: found {}, expected a factor of at least 0",
+                row + 1,
+                columns[k] + 1,
+                values[k]
+            );
+            return Err(Error::whole(path, message).into());
+        }
+    }
+    Ok(())
+}
+
+/// Says where the areas that a table gives differ from those of the elements.
+fn check_areas(given: &[f64], keys: &[u32], areas: &[f64], report: &mut Report) {
+    let of = |element: usize| given.get(keys[element] as usize);
+    let differs = |element: &usize| {
+        of(*element).is_some_and(|area| (area - areas[*element]).abs() > SAME_AREA * areas[*element])
+    };
+    let count = (0..areas.len()).filter(differs).count();
+    if let Some(element) = (0..areas.len()).find(differs) {
+        report.warn(format!(
+            "{} of the mesh, first at element {}: {:?} and {}; are rows and elements in the same order?",
+            counted(count, "area in the table differs from that", "areas in the table differ from those"),
+            element + 1,
+            of(element),
+            areas[element]
+        ));
+    }
+}
+
 impl Imported<'_> {
-    fn check_entries(&self, path: &Path) -> anyhow::Result<()> {
-        for row in 0..self.table.count() {
-            let (columns, values) = self.table.row(row);
-            let wrong = values.iter().position(|x| !(x.is_finite() && *x >= 0.0));
-            if let Some(k) = wrong {
-                let message = format!(
-                    "row {}, column {}: found {}, expected a factor of at least 0",
-                    row + 1,
-                    columns[k] + 1,
-                    values[k]
-                );
-                return Err(Error::whole(path, message).into());
-            }
-        }
-        Ok(())
-    }
-
-    fn check_areas(&self, report: &mut Report) {
-        let of = |element: usize| self.table.areas.get(self.keys[element] as usize);
-        let differs = |element: &usize| {
-            of(*element)
-                .is_some_and(|area| (area - self.areas[*element]).abs() > SAME_AREA * self.areas[*element])
-        };
-        let count = (0..self.areas.len()).filter(differs).count();
-        if let Some(element) = (0..self.areas.len()).find(differs) {
-            report.warn(format!(
-                "{count} areas in the table differ from those of the mesh, first at element {}: {:?} and {}; are rows and elements in the same order?",
-                element + 1,
-                of(element),
-                self.areas[element]
-            ));
-        }
-    }
-
-    /// Factor between two elements.
-    fn get(&self, from: usize, to: usize) -> f64 {
-        self.table.get(self.keys[from] as usize, self.keys[to] as usize)
-    }
-
     fn findings(&self, stated: f64) -> Findings {
         let count = self.areas.len();
-        let mut element_of = vec![usize::MAX; self.table.count()];
-        self.keys.iter().enumerate().for_each(|(element, &key)| element_of[key as usize] = element);
         let mut found = Findings {
             sums: vec![0.0; count],
             reciprocity: vec![0.0; count],
@@ -270,23 +264,17 @@ impl Imported<'_> {
             largest_sum: (0, 0.0),
             above_one: 0,
             to_itself: 0,
-            strangers: 0,
+            strangers: self.strangers,
         };
-        for row in progress("check", self.table.count()).wrap_iter(0..self.table.count()) {
-            let (i, (columns, values)) = (element_of[row], self.table.row(row));
-            if i == usize::MAX {
-                found.strangers += usize::from(!values.is_empty());
-                continue;
-            }
+        // The other side of every pair: its column is the row that is looked at, and rises.
+        let mut other_side = self.table.ascending();
+        for i in progress("check", count).wrap_iter(0..count) {
+            let (columns, values) = self.table.row(i);
             for (&column, &forth) in columns.iter().zip(values) {
-                let j = element_of[column as usize];
-                if j == usize::MAX {
-                    found.strangers += 1;
-                    continue;
-                }
+                let j = column as usize;
                 found.sums[i] += forth;
                 found.to_itself += usize::from(i == j);
-                let back = self.get(j, i) * self.areas[j] / self.areas[i];
+                let back = other_side.get(j, i) * self.areas[j] / self.areas[i];
                 // Where the other side is zero, this visit counts for both rows.
                 let difference = (forth - back).abs();
                 found.reciprocity[i] += difference;
@@ -312,12 +300,10 @@ impl Imported<'_> {
     /// Writes the blocks of S: above the diagonal and on it where it is symmetric, else all.
     fn store(&self, store: &mut Store, symmetric: bool, precision: Precision) -> interchange::Result<()> {
         let count = self.areas.len();
-        let exchange = |i: usize, j: usize| {
-            let forth = self.areas[i] * self.get(i, j);
-            if symmetric { 0.5 * (forth + self.areas[j] * self.get(j, i)) } else { forth }
-        };
         let bar = progress("blocks", count.div_ceil(BLOCK).pow(2));
+        let mut across = self.table.ascending();
         for first in (0..count).step_by(BLOCK) {
+            let mut along = self.table.ascending();
             // Of a symmetric matrix row k of blocks is k blocks shorter.
             bar.inc(if symmetric { (first / BLOCK) as u64 } else { 0 });
             let rows = first..(first + BLOCK).min(count);
@@ -325,11 +311,27 @@ impl Imported<'_> {
                 bar.inc(1);
                 let columns = start..(start + BLOCK).min(count);
                 let triangle = symmetric && start == first;
-                let mut entries = Vec::with_capacity(rows.len() * columns.len());
+                let mut block = vec![0.0; rows.len() * columns.len()];
                 for i in rows.clone() {
-                    let from = if triangle { i } else { columns.start };
-                    entries.extend((from..columns.end).map(|j| exchange(i, j)));
+                    along.before(i, columns.end, |j, factor| {
+                        if j >= columns.start {
+                            block[(i - first) * columns.len() + j - start] += self.areas[i] * factor;
+                        }
+                    });
                 }
+                if symmetric {
+                    for j in columns.clone() {
+                        across.before(j, rows.end, |i, factor| {
+                            block[(i - first) * columns.len() + j - start] += self.areas[j] * factor;
+                        });
+                    }
+                    block.iter_mut().for_each(|entry| *entry *= 0.5);
+                }
+                let entries: Vec<f64> = if triangle {
+                    block.chunks(columns.len()).enumerate().flat_map(|(i, row)| &row[i..]).copied().collect()
+                } else {
+                    block
+                };
                 if entries.iter().all(|&s| s == 0.0) {
                     continue;
                 }
@@ -355,8 +357,8 @@ impl Findings {
         let (row, sum) = self.largest_sum;
         if self.above_one > 0 {
             report.warn(format!(
-                "{} rows sum up to more than 1, most that of element {}: {sum:.6}; more cannot leave an element than it sends",
-                self.above_one,
+                "{} up to more than 1, most that of element {}: {sum:.6}; more cannot leave an element than it sends",
+                counted(self.above_one, "row sums", "rows sum"),
                 row + 1
             ));
         }
@@ -375,12 +377,14 @@ impl Findings {
             ));
         }
         if self.to_itself > 0 {
-            report.warn(format!("{} elements see themselves, which no plane element does", self.to_itself));
+            let those = counted(self.to_itself, "element sees itself", "elements see themselves");
+            report.warn(format!("{those}, which no plane element does"));
         }
         if self.strangers > 0 {
-            report.warn(format!(
-                "{} rows or entries belong to faces without an element and were left out",
-                self.strangers
+            report.warn(counted(
+                self.strangers,
+                "row or entry belongs to a face without an element and was left out",
+                "rows or entries belong to faces without an element and were left out",
             ));
         }
     }

@@ -7,6 +7,7 @@
 
 use crate::info::UNVERIFIED;
 use anyhow::bail;
+use interchange::counted::counted;
 use interchange::error::{Error, Result, nearest_name};
 use interchange::grouping::{By, Grouping};
 use interchange::ids::ElementId;
@@ -228,7 +229,7 @@ impl Place {
         for (name, from, to, (area, factor, error, elements)) in
             [("first", first, second, sides[0]), ("second", second, first, sides[1])]
         {
-            text.line(name, format!("{from}: {elements} elements, area {area:.6e}"));
+            text.line(name, format!("{from}: {}, area {area:.6e}", counted(elements, "element", "elements")));
             text.line("", format!("F({from} -> {to}) = {factor:.12e}, error at most {error:.3e}"));
         }
         text.line("made by", self.made_by());

@@ -123,6 +123,10 @@ fn other_ways_to_write_the_same_are_read() {
     let floats: Vec<u8> = (0..36).flat_map(|k| (factor(k / 6, k % 6) as f32).to_be_bytes()).collect();
     let header = b"#?RADIANCE\nNROWS=6\nNCOLS=6\nNCOMP=1\nBigEndian=1\nFORMAT=float\n\n";
     same("f.rmx", &[&header[..], &floats].concat(), 6.0 * 1e-8);
+    // A chain of programs: what each has written before is shifted to the right, and of two formats the last one holds.
+    let doubles: Vec<u8> = (0..36).flat_map(|k| (4.0 * factor(k / 6, k % 6)).to_le_bytes()).collect();
+    let header = b"#?RADIANCE\nrmtxop -fd a.rmx\n\tNCOMP=3\nEXPOSURE= 4\nNROWS=6\nNCOLS=6\nNCOMP=1\nFORMAT=float\nBigEndian=0\nFORMAT=double\n\n";
+    same("d.rmx", &[&header[..], &doubles].concat(), 0.0);
 }
 
 #[test]
@@ -136,7 +140,7 @@ fn both_sides_of_a_pair_are_averaged_or_kept_and_it_is_said() {
     assert!((errors[1] - 0.01).abs() < 1e-12 && (errors[0] - 0.02).abs() < 1e-12, "{errors:?}");
     assert!((difference(&room, matrix.path()) - 0.01).abs() < 1e-12);
     let warnings = report["warnings"].to_string();
-    assert!(warnings.contains("1 rows sum up to more than 1, most that of element 1: 1.02"), "{warnings}");
+    assert!(warnings.contains("1 row sums up to more than 1, most that of element 1: 1.02"), "{warnings}");
     assert!(warnings.contains("the pair of elements 1 and 2"), "{warnings}");
 
     let keep = Wishes { reciprocity: Reciprocity::Keep, tolerance: Some(1e-3), ..wishes() };

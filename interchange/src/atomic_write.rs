@@ -39,6 +39,7 @@ pub struct Partial {
 impl Partial {
     /// A new file under a name of its own.
     pub fn create(target: &Path) -> Result<Self> {
+        refuse_stdout(target)?;
         refuse_folder(target)?;
         let (prefix, folder) = (format!(".{}.", name_of(target)), folder_of(target));
         let make = || tempfile::Builder::new().prefix(&prefix).suffix(".partial").tempfile_in(folder);
@@ -50,6 +51,7 @@ impl Partial {
     /// A new file under the name of [`Partial::path_for`], where a later run finds what a killed one left. What stands
     /// there is replaced.
     pub fn create_named(target: &Path, word: &str) -> Result<Self> {
+        refuse_stdout(target)?;
         refuse_folder(target)?;
         Self::named(target, word, OpenOptions::new().create(true).truncate(true))
     }
@@ -139,6 +141,15 @@ pub const STDOUT: &str = "-";
 /// Whether an output is standard output.
 pub fn is_stdout(path: &Path) -> bool {
     path == Path::new(STDOUT)
+}
+
+/// Refuses [`STDOUT`] as the name of what must be a file, before anything is computed for it.
+///
+/// # Errors
+/// It is standard output.
+pub fn refuse_stdout(path: &Path) -> Result<()> {
+    let message = "expected the name of a file: standard output takes tables and geometry only; for a file of this name say ./-";
+    if is_stdout(path) { Err(Error::whole(path, message)) } else { Ok(()) }
 }
 
 /// Writes what `fill` produces to `path`, or to standard output where that is [`STDOUT`]. On any error the old file is

@@ -278,9 +278,13 @@ fn check_envelope(path: &Path, bytes: &[u8], kind: Kind, remake: &str) -> Result
         return Err(wrong("file", format!("{} bytes", bytes.len()), format!("{name}, which has more")));
     }
     if bytes[..8] != kind.magic() {
-        let other = Kind::ALL.into_iter().find(|k| k.magic() == bytes[..8]);
-        let found = other.map_or("something else".to_owned(), |k| k.describe().0.to_owned());
-        return Err(wrong("first 8 bytes", found, name.into()));
+        let Some(other) = Kind::ALL.into_iter().find(|k| k.magic() == bytes[..8]) else {
+            return Err(wrong("first 8 bytes", "something else".into(), name.into()));
+        };
+        let (found, maker) = other.describe();
+        let shows = maker.split(' ').next().unwrap_or(maker);
+        let remedy = format!("give {name}; {shows} info shows what is in this file");
+        return Err(Error::format(path, "first 8 bytes", found, name, remedy));
     }
     let word = |at: usize| u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]]);
     let (major, minor) = (word(8) & 0xffff, word(8) >> 16);

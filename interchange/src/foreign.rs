@@ -25,12 +25,13 @@ pub mod vtu;
 
 pub use surface::{Field, Surface, Values};
 
-use crate::atomic_write::Outcome;
+use crate::atomic_write::{Outcome, is_stdout};
 use crate::error::{Error, Result, meant_ending};
+use clap::ValueEnum;
 use std::path::Path;
 
-/// What the end of a file name asks for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// What the end of a file name asks for, or a flag.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     /// Polygon file format, binary.
     Ply,
@@ -68,18 +69,33 @@ impl Format {
         Self::of(path).ok_or_else(|| {
             let names: Vec<String> = ENDINGS.iter().map(|(name, _)| format!(".{name}")).collect();
             let meant = meant_ending(path, ENDINGS.map(|(name, _)| name));
-            let message = format!("the name must end in {}, which says the format{meant}", names.join(", "));
+            let names = names.join(", ");
+            let message =
+                format!("the name must end in {names}, which says the format{meant}; or say --format");
             Error::whole(path, message)
         })
     }
+
+    /// The format asked for, or else as [`Format::required`].
+    ///
+    /// # Errors
+    /// The ending is none of the formats, or standard output cannot take this one.
+    pub fn asked_or(path: &Path, asked: Option<Self>) -> Result<Self> {
+        let format = asked.map_or_else(|| Self::required(path), Ok)?;
+        if format == Self::Obj && is_stdout(path) {
+            let message = "an OBJ has its materials in a file beside it; give a name that ends in .obj";
+            return Err(Error::whole(path, message));
+        }
+        Ok(format)
+    }
 }
 
-/// Writes a surface in the format that the name asks for.
+/// Writes a surface in the format that is asked for, or else that the name asks for.
 ///
 /// # Errors
-/// The ending is none of the formats, or the file cannot be written.
-pub fn write(path: &Path, surface: &Surface) -> Result<Outcome> {
-    match Format::required(path)? {
+/// As [`Format::asked_or`], or the file cannot be written.
+pub fn write(path: &Path, surface: &Surface, asked: Option<Format>) -> Result<Outcome> {
+    match Format::asked_or(path, asked)? {
         Format::Ply => ply::write(path, surface),
         Format::Vtu => vtu::write(path, surface),
         Format::Glb => glb::write(path, surface),

@@ -11,6 +11,7 @@
 
 pub mod atomic_write;
 pub mod container;
+pub mod counted;
 pub mod digest;
 pub mod error;
 pub mod font;

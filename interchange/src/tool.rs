@@ -9,18 +9,21 @@ use indicatif::{ProgressDrawTarget, ProgressFinish, ProgressStyle};
 use std::fmt::Display;
 use std::io::IsTerminal;
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::OnceLock;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Steps of a bar that [`show_fall`] moves.
 pub const STEPS_OF_FALL: usize = 1000;
 
-/// What takes less time shows no bar: one that comes and goes at once tells nothing.
-const BEFORE_BAR: Duration = Duration::from_secs(1);
+/// A program that takes less time shows no bar.
+const BEFORE_BARS: Duration = Duration::from_secs(1);
+/// Nor does a step of a longer one that takes less: a bar that comes and goes at once tells nothing. Many such steps in a
+/// row leave a program without a bar for a while, hence not a second, too.
+const BEFORE_BAR: Duration = Duration::from_millis(200);
 
-/// Whether bars are drawn: not before [`Common::start`], so that nothing but a program draws any.
-static SHOWS_PROGRESS: AtomicBool = AtomicBool::new(false);
+/// When the program started, where bars are drawn: not before [`Common::start`], so that nothing but a program draws any.
+static SHOWS_PROGRESS_SINCE: OnceLock<Instant> = OnceLock::new();
 
 /// Line at the end of each tool's `--help`.
 pub const EXIT_CODES: &str =
@@ -68,7 +71,9 @@ impl Common {
     /// Sets up talk on stderr, the thread pool and what happens on Ctrl-C; to be called once, first.
     pub fn start(&self) {
         crate::interrupt::clear_up_when_interrupted();
-        SHOWS_PROGRESS.store(!self.quiet && std::io::stderr().is_terminal(), Ordering::Relaxed);
+        if !self.quiet && std::io::stderr().is_terminal() {
+            let _ = SHOWS_PROGRESS_SINCE.set(Instant::now());
+        }
         let level = match (self.quiet, self.verbose) {
             (true, _) => tracing::Level::ERROR,
             (_, true) => tracing::Level::DEBUG,
@@ -88,12 +93,13 @@ impl Common {
     }
 }
 
-/// A bar for `steps` of work with the time left, on a terminal, from the first step after a second on; nothing elsewhere or
-/// with `--quiet`. It goes when dropped.
+/// A bar for `steps` of work with the time left, on a terminal, from the first step on after the program has run for a
+/// second; nothing elsewhere or with `--quiet`. It goes when dropped.
 pub fn progress(title: &'static str, steps: usize) -> ProgressBar {
-    if !SHOWS_PROGRESS.load(Ordering::Relaxed) {
+    let Some(since) = SHOWS_PROGRESS_SINCE.get() else {
         return ProgressBar::hidden();
-    }
+    };
+    let wait = BEFORE_BARS.saturating_sub(since.elapsed()).max(BEFORE_BAR);
     let bar = ProgressBar::with_draw_target(Some(steps as u64), ProgressDrawTarget::hidden());
     let style = ProgressStyle::with_template("{prefix} [{wide_bar}] {percent} % {eta} left");
     let bar = bar.with_prefix(title).with_finish(ProgressFinish::AndClear);
@@ -101,7 +107,7 @@ pub fn progress(title: &'static str, steps: usize) -> ProgressBar {
     // Hidden, it counts and estimates all the same. Without a thread to be had the work is done unseen.
     let later = bar.downgrade();
     let _ = thread::Builder::new().spawn(move || {
-        thread::sleep(BEFORE_BAR);
+        thread::sleep(wait);
         if let Some(bar) = later.upgrade().filter(|bar| !bar.is_finished()) {
             bar.set_draw_target(ProgressDrawTarget::stderr());
         }

@@ -13,6 +13,7 @@ use crate::triangulation::Trouble;
 use geometry::plane::{PLANARITY, Plane};
 use geometry::polygon;
 use glam::DVec3;
+use interchange::counted::counted;
 use interchange::ids::{GroupId, MaterialId};
 use interchange::report::Report;
 use interchange::scene::{Scene, SceneFace};
@@ -134,12 +135,21 @@ pub fn clean(scene: &Scene, off: &Off<Step>, report: &mut Report) -> Result<Clea
     report.count("faces", faces.len());
     report.estimate("largest plane deviation", largest_deviation);
     if without_area > 0 {
-        report.warn(format!("{}: {without_area} faces without area were dropped", scene.path.display()));
+        report.warn(format!(
+            "{}: {}",
+            scene.path.display(),
+            counted(without_area, "face without area was dropped", "faces without area were dropped")
+        ));
     }
     if cut > 0 {
         report.warn(format!(
-            "{}: {cut} faces that are not planar were cut into triangles (largest deviation {largest_deviation:.1e} of their side)",
-            scene.path.display()
+            "{}: {} (largest deviation {largest_deviation:.1e} of the side)",
+            scene.path.display(),
+            counted(
+                cut,
+                "face that is not planar was cut into triangles",
+                "faces that are not planar were cut into triangles"
+            )
         ));
     }
     let lines = |which: &[usize]| {
@@ -148,9 +158,14 @@ pub fn clean(scene: &Scene, off: &Off<Step>, report: &mut Report) -> Result<Clea
     };
     if !oriented.flipped.is_empty() {
         report.warn(format!(
-            "{}: {} faces contradicted their neighbours and were turned over, on lines {} (--no-clean orient keeps them)",
+            "{}: {}, on {} {} (--no-clean orient keeps this)",
             scene.path.display(),
-            oriented.flipped.len(),
+            counted(
+                oriented.flipped.len(),
+                "face contradicted its neighbours and was turned over",
+                "faces contradicted their neighbours and were turned over"
+            ),
+            if oriented.flipped.len() == 1 { "line" } else { "lines" },
             lines(&oriented.flipped)
         ));
     }

@@ -6,6 +6,7 @@
 use anyhow::bail;
 use geometry::polygon;
 use glam::DVec3;
+use interchange::counted::counted;
 use interchange::error::Result;
 use interchange::mesh::Mesh;
 use serde_json::{Value, json};
@@ -154,8 +155,8 @@ impl Difference {
             line(
                 name,
                 format!(
-                    "{} elements of area {:.6e}; {} of them ({:.3} % of the area) the other does not have",
-                    s.elements,
+                    "{} of area {:.6e}; {} of them ({:.3} % of the area) the other does not have",
+                    counted(s.elements, "element", "elements"),
                     s.area,
                     s.own,
                     100.0 * s.own_area / s.area

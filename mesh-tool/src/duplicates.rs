@@ -3,6 +3,7 @@
 use crate::clean::Face;
 use crate::places::Places;
 use geometry::polygon;
+use interchange::counted::counted;
 use interchange::report::Report;
 use interchange::scene::Scene;
 use std::collections::HashMap;
@@ -42,8 +43,13 @@ pub fn without_duplicates(
     report.estimate("area of dropped duplicates", lost.abs());
     if dropped > 0 {
         report.warn(format!(
-            "{}: {dropped} faces with the corners and orientation of another were dropped",
-            scene.path.display()
+            "{}: {}",
+            scene.path.display(),
+            counted(
+                dropped,
+                "face with the corners and orientation of another was dropped",
+                "faces with the corners and orientation of another were dropped"
+            )
         ));
     }
     (faces.into_iter().zip(kept).filter(|(_, kept)| *kept).map(|(face, _)| face).collect(), dropped)

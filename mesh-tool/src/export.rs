@@ -13,8 +13,8 @@ use std::path::Path;
 ///
 /// # Errors
 /// The mesh cannot be read, the format is not known, or the output cannot be written.
-pub fn write(path: &Path, output: &Path) -> Result<()> {
-    Format::required(output)?;
+pub fn write(path: &Path, output: &Path, format: Option<Format>) -> Result<()> {
+    Format::asked_or(output, format)?;
     let table = path.with_extension("materials");
     refuse_input(output, [path, table.as_path()])?;
     let (mesh, _, digest) = Mesh::read(path)?;
@@ -23,7 +23,7 @@ pub fn write(path: &Path, output: &Path) -> Result<()> {
     let areas = mesh.element_ids().map(|e| geometry::polygon::area(&mesh.element_corners(e))).collect();
     surface.polygon_fields.push(Field::scalars("area", areas));
     surface.comments.push(format!("elements of mesh {}", digest.short()));
-    foreign::write(output, &surface).map(|_| ())
+    foreign::write(output, &surface, format).map(|_| ())
 }
 
 /// Turns a scene of View3D or Radiance into an OBJ with its MTL, and says what could not be taken over.
@@ -39,6 +39,6 @@ pub fn convert(path: &Path, output: &Path) -> Result<Vec<String>> {
         ));
     }
     let (surface, said) = foreign::read_scene(path)?;
-    foreign::write(output, &surface)?;
+    foreign::write(output, &surface, None)?;
     Ok(said)
 }

@@ -5,6 +5,7 @@ use crate::sheets;
 use geometry::polygon;
 use glam::DVec3;
 use interchange::Result;
+use interchange::counted::counted;
 use interchange::digest::Digest;
 use interchange::ids::GroupId;
 use interchange::materials::MaterialTable;
@@ -164,10 +165,10 @@ fn mesh_page(path: &Path, mesh: &Mesh, provenance: &Provenance, digest: Digest) 
     let _ = writeln!(page, "nodes      {} at {} vertices", mesh.node_vertices.len(), mesh.vertices.len());
     let _ = writeln!(
         page,
-        "faces      {} of {} in the scene, {} convex pieces block light",
+        "faces      {} of {} in the scene, {} light",
         mesh.face_count(),
         mesh.input_face_count,
-        mesh.occluders.len()
+        counted(mesh.occluders.len(), "convex piece blocks", "convex pieces block")
     );
     let [value, slope, curvature] = lines_by_order(mesh);
     let _ = writeln!(
@@ -176,9 +177,9 @@ fn mesh_page(path: &Path, mesh: &Mesh, provenance: &Provenance, digest: Digest) 
     );
     let _ = writeln!(
         page,
-        "clusters   {}, {} leaves",
+        "clusters   {}, {}",
         mesh.clusters.len(),
-        mesh.clusters.iter().filter(|cluster| cluster.is_leaf()).count()
+        counted(mesh.clusters.iter().filter(|cluster| cluster.is_leaf()).count(), "leaf", "leaves")
     );
     let _ = writeln!(page, "extent     {low:?} to {high:?}");
     let _ = writeln!(
@@ -196,25 +197,28 @@ fn mesh_page(path: &Path, mesh: &Mesh, provenance: &Provenance, digest: Digest) 
         format!("{title}{}\n", parts.join(", "))
     };
     page += &histogram("angles     smallest, degrees: ", &angle_histogram(mesh));
-    if quality.narrow > 0 {
-        let _ = writeln!(
-            page,
-            "narrow     {} elements below 25 degrees: {} where lines or borders meet so, {} in strips between them, {} others",
-            quality.narrow,
-            quality.narrow_at_given_angles,
-            quality.narrow_in_strips,
-            quality.narrow_freely()
-        );
-    }
-    if quality.uneven > 0 {
-        let _ = writeln!(
-            page,
-            "uneven     {} pairs of neighbours differ in size by more than 2: {} in strips between lines or borders, {} others",
-            quality.uneven,
-            quality.uneven_in_strips,
-            quality.uneven - quality.uneven_in_strips
-        );
-    }
+    page += &poor(
+        "narrow",
+        quality.narrow,
+        ["element below 25 degrees", "elements below 25 degrees"],
+        &[
+            (quality.narrow_at_given_angles, "where lines or borders meet so"),
+            (quality.narrow_in_strips, "in strips between them"),
+            (quality.narrow_freely(), "elsewhere"),
+        ],
+    );
+    page += &poor(
+        "uneven",
+        quality.uneven,
+        [
+            "pair of neighbours differs in size by more than 2",
+            "pairs of neighbours differ in size by more than 2",
+        ],
+        &[
+            (quality.uneven_in_strips, "in strips between lines or borders"),
+            (quality.uneven - quality.uneven_in_strips, "elsewhere"),
+        ],
+    );
     page += &histogram("sizes      longest edge, parts of the extent: ", &size_histogram(mesh));
     let hidden: f64 = mesh.hidden_areas.iter().sum();
     if hidden > 0.0 {
@@ -239,7 +243,11 @@ fn mesh_page(path: &Path, mesh: &Mesh, provenance: &Provenance, digest: Digest) 
         );
     }
     if groups.len() > SHOWN {
-        let _ = writeln!(page, "... and {} groups more (--json lists all)", groups.len() - SHOWN);
+        let _ = writeln!(
+            page,
+            "... and {} more (--json lists all)",
+            counted(groups.len() - SHOWN, "group", "groups")
+        );
     }
     page
 }
@@ -321,6 +329,15 @@ fn mesh_json(mesh: &Mesh, provenance: &Provenance, digest: Digest) -> String {
         "groups": groups,
     });
     format!("{value:#}\n")
+}
+
+/// A line on elements of a poor kind, with how many of them lie where; nothing where there are none.
+fn poor(title: &str, count: usize, what: [&str; 2], places: &[(usize, &str)]) -> String {
+    if count == 0 {
+        return String::new();
+    }
+    let places: Vec<String> = places.iter().map(|(count, place)| format!("{count} {place}")).collect();
+    format!("{title:<10} {}: {}\n", counted(count, what[0], what[1]), places.join(", "))
 }
 
 fn materials_json(table: &MaterialTable, provenance: &Provenance, digest: Digest) -> String {

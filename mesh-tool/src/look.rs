@@ -1,6 +1,7 @@
 //! `mesh-tool info --element` and `--group`: one element with its corners, or one group with its measures.
 
 use geometry::polygon;
+use interchange::counted::counted;
 use interchange::error::{Error, Result, nearest_name};
 use interchange::ids::{ElementId, GroupId};
 use interchange::mesh::{FACE_EMITS, Mesh};
@@ -105,7 +106,11 @@ fn group(path: &Path, mesh: &Mesh, name: &str, as_json: bool) -> Result<String> 
         });
         return Ok(format!("{data:#}\n"));
     }
-    let mut text = format!("group      {name}: {} elements on {} faces\n", elements.len(), faces.len());
+    let mut text = format!(
+        "group      {name}: {} on {}\n",
+        counted(elements.len(), "element", "elements"),
+        counted(faces.len(), "face", "faces")
+    );
     if !elements.is_empty() {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "area       {total:.6e}, elements from {least:.6e} to {largest:.6e}");

@@ -2,6 +2,7 @@
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use interchange::atomic_write;
+use interchange::foreign::Format;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
 use interchange::scene::Scene;
@@ -76,7 +77,10 @@ enum Command {
     Export {
         /// Mesh (.mesh); colours are those of the .materials beside it
         file: PathBuf,
-        /// File to write; its ending says the format
+        /// Format, where the ending of the output does not say it
+        #[arg(long, value_enum)]
+        format: Option<Format>,
+        /// File to write, - for standard output; its ending says the format
         #[arg(short, long, value_name = "FILE")]
         output: PathBuf,
     },
@@ -253,7 +257,7 @@ fn run(line: &CommandLine) -> anyhow::Result<Finish> {
         }
         Command::Pages { prefix } => tool::pages::write(CommandLine::command(), prefix)?,
         Command::Picture { file, output, plane } => picture::draw(file, output, *plane)?,
-        Command::Export { file, output } => export::write(file, output)?,
+        Command::Export { file, format, output } => export::write(file, output, *format)?,
         Command::Import { file, output } => {
             for finding in export::convert(file, output)? {
                 tracing::warn!("{finding}");
@@ -291,5 +295,6 @@ fn write_materials(scene: &Scene, path: &Path) -> interchange::Result<()> {
 }
 
 fn refuse_overwriting(scene: &Scene, output: &Path) -> interchange::Result<()> {
+    atomic_write::refuse_stdout(output)?;
     atomic_write::refuse_input(output, depfile::dependencies(scene).iter().map(PathBuf::as_path))
 }

@@ -25,6 +25,7 @@ use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand};
 use glam::DVec3;
 use interchange::atomic_write::{is_stdout, refuse_input};
+use interchange::counted::counted;
 use interchange::provenance::Provenance;
 use interchange::report::Report;
 use interchange::scene::Settings;
@@ -411,7 +412,12 @@ fn warn_of_range(picture: &Picture, precision: Precision, report: &mut Report) {
     match exr_file::fit(picture, precision) {
         Fit::Good => {}
         Fit::TooBright(count) => {
-            report.warn(format!("{count} values are too large to store and become infinite; {remedy}"));
+            let those = counted(
+                count,
+                "value is too large to store and becomes",
+                "values are too large to store and become",
+            );
+            report.warn(format!("{those} infinite; {remedy}"));
         }
         Fit::TooDark => {
             let highest = picture.highest();

@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use exr::prelude::FlatSamples;
+use interchange::counted::counted;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -119,7 +120,8 @@ impl Difference {
                 );
             }
             if c.not_finite > 0 {
-                let _ = write!(text, "; {} pixels are finite in one alone", c.not_finite);
+                let _ =
+                    write!(text, "; {} finite in one alone", counted(c.not_finite, "pixel is", "pixels are"));
             }
             text.push('\n');
         }

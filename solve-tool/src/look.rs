@@ -3,6 +3,7 @@
 
 use crate::channels::CHANNEL_NAMES;
 use anyhow::bail;
+use interchange::counted::counted;
 use interchange::error::{Error, nearest_name};
 use interchange::grouping::{By, Grouping};
 use interchange::ids::ElementId;
@@ -100,8 +101,8 @@ pub fn describe(path: &Path, mesh_path: Option<&Path>, look: &Look, as_json: boo
         line(
             "area",
             format!(
-                "{total:.6e}, {hidden:.6e} of it hidden and dark, the rest in {} elements",
-                elements.len()
+                "{total:.6e}, {hidden:.6e} of it hidden and dark, the rest in {}",
+                counted(elements.len(), "element", "elements")
             ),
         );
     }

@@ -113,7 +113,10 @@ enum Command {
         /// With elements: radiance that shows as white, W m^-2 sr^-1 [default: what 98 % of the area stays below]
         #[arg(long, value_name = "L", value_parser = positive)]
         white: Option<f64>,
-        /// Table (.csv or .npy) or elements (.ply, .vtu, .glb, .obj or .rad) to write
+        /// Format of elements, where the ending of the output does not say it
+        #[arg(long, value_enum)]
+        format: Option<Format>,
+        /// Table (.csv or .npy) or elements (.ply, .vtu, .glb, .obj or .rad) to write; - for standard output
         #[arg(long, short, value_name = "FILE")]
         output: PathBuf,
     },
@@ -214,15 +217,15 @@ fn run(command: Command) -> anyhow::Result<Finish> {
             };
             return Ok(solve_tool::run::run(&request)?);
         }
-        Command::Export { solution, mesh, by, quantity, units, efficacy, white, output } => {
-            if Format::of(&output).is_some() {
+        Command::Export { solution, mesh, by, quantity, units, efficacy, white, format, output } => {
+            if format.is_some() || Format::of(&output).is_some() {
                 if by.is_some() || quantity != Quantity::Radiosity || units != Units::Radiometric {
                     refuse(
                         ErrorKind::ArgumentConflict,
                         "--by, --quantity and --units go with tables (.csv, .npy)",
                     );
                 }
-                solve_tool::surface::write(&solution, &mesh, white, &output)?;
+                solve_tool::surface::write(&solution, &mesh, white, &output, format)?;
                 return Ok(Finish::Done);
             }
             if white.is_some() {

@@ -15,7 +15,7 @@ use crate::start;
 use crate::system::System;
 use crate::thermal;
 use crate::work::Shown;
-use interchange::atomic_write::refuse_input;
+use interchange::atomic_write::{refuse_input, refuse_stdout};
 use interchange::materials_input::load_materials;
 use interchange::matrix::Matrix;
 use interchange::mesh::Mesh;
@@ -96,6 +96,7 @@ impl SolveRequest {
 
 /// Solves and writes the solution and its report. Nothing is written where there is no solution.
 pub fn run(request: &SolveRequest) -> Result<Finish> {
+    refuse_stdout(&request.output)?;
     refuse_input(&request.output, request.inputs())?;
     let mut report = Report::new(TOOL, VERSION);
     let (mesh, _, mesh_digest) = report.phase("read mesh", || Mesh::read(&request.mesh))?;

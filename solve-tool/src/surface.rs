@@ -17,7 +17,7 @@ use std::path::Path;
 const DARKER_THAN_WHITE: f64 = 0.98;
 
 /// Writes the elements of `mesh` with radiosity B and irradiance H (W m^-2), and what else the solution holds, in the format
-/// that the name of `output` asks for. `white`: the radiance, W m^-2 sr^-1, that shows as white.
+/// asked for, or else that the name of `output` asks for. `white`: the radiance, W m^-2 sr^-1, that shows as white.
 ///
 /// # Errors
 /// The files do not belong together, the format holds no solution, or the output cannot be written.
@@ -26,8 +26,9 @@ pub fn write(
     mesh_path: &Path,
     white: Option<f64>,
     output: &Path,
+    format: Option<Format>,
 ) -> interchange::Result<()> {
-    if Format::required(output)? == Format::Vs3 {
+    if Format::asked_or(output, format)? == Format::Vs3 {
         return Err(Error::whole(
             output,
             "View3D's format holds no solution; mesh-tool export writes its geometry",
@@ -44,7 +45,7 @@ pub fn write(
         mesh.element_ids().map(|e| geometry::polygon::area(&mesh.element_corners(e))).collect();
     fill(&mut surface, &solution, &areas, white);
     surface.comments.insert(0, format!("solution {} on mesh {}", digest.short(), mesh_digest.short()));
-    foreign::write(output, &surface).map(|_| ())
+    foreign::write(output, &surface, format).map(|_| ())
 }
 
 fn fill(surface: &mut Surface, solution: &Solution, areas: &[f64], white: Option<f64>) {

@@ -91,7 +91,44 @@ fn a_dash_is_standard_output() {
         assert_eq!(export(&file), "");
         assert_eq!(export("-".as_ref()), tests::text(&file));
     }
-    assert!(!folder.path().join("-").exists());
+    // Geometry, too, where it is one file; what is mapped or renamed must be a file, and is refused before it is computed.
+    let obj = tests::scene("goral_cube.obj");
+    for name in ["mesh-tool", "solve-tool"] {
+        let input = chain.path(if name == "mesh-tool" { "mesh" } else { "sol" });
+        let file = folder.path().join("surface.rad");
+        let export = |output: &std::path::Path, format: &str| {
+            let mut export = tool(name);
+            export
+                .current_dir(folder.path())
+                .arg("export")
+                .arg(&input)
+                .args(["--format", format, "-o"])
+                .arg(output);
+            if name == "solve-tool" {
+                export.arg("--mesh").arg(chain.path("mesh"));
+            }
+            run(&mut export)
+        };
+        export(&file, "rad").expect_code(0);
+        assert_eq!(export("-".as_ref(), "rad").expect_code(0).stdout, tests::text(&file));
+        assert!(export("-".as_ref(), "obj").expect_code(1).stderr.contains("in a file beside it"));
+    }
+    let refused = |name: &str, words: &[&std::path::Path]| {
+        let mut command = tool(name);
+        command.current_dir(folder.path()).args(words).args(["-o", "-"]);
+        assert!(
+            run(&mut command).expect_code(1).stderr.contains("expected the name of a file"),
+            "{name} {words:?}"
+        );
+    };
+    let (mesh, matrix) = (chain.path("mesh"), chain.path("ff"));
+    refused("mesh-tool", &["build".as_ref(), &obj]);
+    refused("mesh-tool", &["materials".as_ref(), &obj]);
+    refused("formfactor-tool", &["compute".as_ref(), &mesh]);
+    refused("formfactor-tool", &["merge".as_ref(), &matrix]);
+    refused("solve-tool", &["solve".as_ref(), &matrix, "--mesh".as_ref(), &mesh]);
+    let names: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert!(!names.iter().any(|name| name.to_string_lossy().starts_with('-')), "{names:?}");
 }
 
 /// On a terminal what takes over a second says how much time is left, and what does not says nothing.

@@ -46,8 +46,10 @@ pub fn read(path: &Path, text: &str, expected: usize) -> Result<Table> {
         .delimiter(delimiter)
         .from_reader(text.as_bytes());
     let mut lines = Vec::new();
+    let bar = progress("lines", text.len());
     for record in reader.records() {
         let record = record.map_err(|e| Error::whole(path, format!("not a CSV table: {e}")))?;
+        bar.set_position(record.position().map_or(0, csv::Position::byte));
         let line = record.position().map_or(0, |position| position.line() as usize);
         lines.push((line, record));
     }

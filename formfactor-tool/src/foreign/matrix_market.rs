@@ -1,17 +1,13 @@
 //! Factors in the MatrixMarket exchange format (Boisvert, Pozo & Remington 1996): a banner, comments, sizes, entries that
 //! count from 1.
 
-use super::table::Numbers;
+use super::table::{Numbers, Steps};
 use super::{RowSource, Table};
 use interchange::atomic_write::{self, Outcome};
 use interchange::error::{Error, Result};
 use interchange::tables::number;
-use interchange::tool::progress;
 use std::io::SeekFrom;
 use std::path::Path;
-
-/// Entries between two looks at the bar, which cost as much as reading one.
-const ENTRIES_SHOWN: usize = 1 << 12;
 
 /// Writes the entries that are not zero. Their number is known at the end only; its place is kept free in the header.
 ///
@@ -71,11 +67,9 @@ pub fn read(path: &Path, text: &str, expected: usize) -> Result<Table> {
     };
     if layout == "coordinate" {
         let listed: usize = numbers.next("the number of entries")?;
-        let bar = progress("read", listed);
+        let bar = Steps::new("read", listed);
         for k in 0..listed {
-            if k % ENTRIES_SHOWN == 0 {
-                bar.set_position(k as u64);
-            }
+            bar.at(k);
             let [row, column] = [numbers.next::<usize>("a row")?, numbers.next::<usize>("a column")?];
             let value = numbers.next("a value")?;
             if !(1..=count).contains(&row) || !(1..=count).contains(&column) {
@@ -97,5 +91,5 @@ pub fn read(path: &Path, text: &str, expected: usize) -> Result<Table> {
         }
     }
     numbers.end()?;
-    Table::from_entries(path, count, entries)
+    Table::from_entries(path, count, &entries)
 }

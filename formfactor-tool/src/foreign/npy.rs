@@ -1,11 +1,12 @@
 //! Factors as a two-dimensional numpy array.
 
+use super::table::Steps;
 use super::{RowSource, Table};
 use interchange::atomic_write::Outcome;
 use interchange::error::{Error, Result};
 use interchange::tables::write_npy;
 use interchange::tool::progress;
-use npyz::{NpyFile, Order};
+use npyz::{Deserialize, NpyFile, NpyReader, Order};
 use std::io::Read;
 use std::path::Path;
 
@@ -56,31 +57,46 @@ pub(super) fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<NpyFile<&'a [u8]>
 /// All items of an array of numbers, in the order of the file.
 pub(super) fn floats<R: Read>(path: &Path, file: NpyFile<R>) -> Result<Vec<f64>> {
     let found = file.dtype().descr();
-    let failed = |e: std::io::Error| Error::whole(path, format!("the array is cut short: {e}"));
     let file = match file.try_data::<f64>() {
-        Ok(values) => return values.collect::<std::io::Result<_>>().map_err(failed),
+        Ok(values) => return items(path, values, |x| x),
         Err(file) => file,
     };
-    let file = match file.try_data::<f32>() {
-        Ok(values) => {
-            return values.map(|x| x.map(f64::from)).collect::<std::io::Result<_>>().map_err(failed);
+    match file.try_data::<f32>() {
+        Ok(values) => items(path, values, f64::from),
+        Err(_) => {
+            Err(Error::whole(path, format!("found items of type {found}, expected float32 or float64")))
         }
-        Err(file) => file,
-    };
-    let _ = file;
-    Err(Error::whole(path, format!("found items of type {found}, expected float32 or float64")))
+    }
 }
 
-/// All items of an array of whole numbers.
-pub(super) fn integers<R: Read>(path: &Path, file: NpyFile<R>) -> Result<Vec<i64>> {
+/// All items of an array of whole numbers that count or number something; what is out of the range of `T` becomes `none`.
+pub(super) fn integers<R: Read, T>(path: &Path, file: NpyFile<R>, none: T) -> Result<Vec<T>>
+where
+    T: Copy + TryFrom<i32> + TryFrom<i64>,
+{
     let found = file.dtype().descr();
-    let failed = |e: std::io::Error| Error::whole(path, format!("the array is cut short: {e}"));
     let file = match file.try_data::<i64>() {
-        Ok(values) => return values.collect::<std::io::Result<_>>().map_err(failed),
+        Ok(values) => return items(path, values, |x| T::try_from(x).unwrap_or(none)),
         Err(file) => file,
     };
     match file.try_data::<i32>() {
-        Ok(values) => values.map(|x| x.map(i64::from)).collect::<std::io::Result<_>>().map_err(failed),
+        Ok(values) => items(path, values, |x| T::try_from(x).unwrap_or(none)),
         Err(_) => Err(Error::whole(path, format!("found items of type {found}, expected int32 or int64"))),
     }
+}
+
+fn items<A: Deserialize, R: Read, T>(
+    path: &Path,
+    values: NpyReader<A, R>,
+    convert: impl Fn(A) -> T,
+) -> Result<Vec<T>> {
+    // As many as the header says, which were found not to be more than the file has bytes.
+    let count = values.len() as usize;
+    let bar = Steps::new("arrays", count);
+    let mut items = Vec::with_capacity(count);
+    for value in values {
+        bar.at(items.len());
+        items.push(convert(value.map_err(|e| Error::whole(path, format!("the array is cut short: {e}")))?));
+    }
+    Ok(items)
 }

@@ -72,7 +72,7 @@ pub fn read(path: &Path, bytes: &[u8], expected: usize) -> Result<Table> {
     let entries = zip::read(path, bytes)?;
     let find = |wanted: &str| -> Result<&[u8]> {
         let found = entries.iter().find(|(name, _)| name.strip_suffix(".npy") == Some(wanted));
-        found.map(|(_, content)| content.as_slice()).ok_or_else(|| {
+        found.map(|(_, content)| content.as_ref()).ok_or_else(|| {
             let names: Vec<&str> = entries.iter().map(|(name, _)| name.as_str()).collect();
             let message = format!(
                 "no array {wanted} among {}; expected what scipy.sparse.save_npz writes",
@@ -81,12 +81,13 @@ pub fn read(path: &Path, bytes: &[u8], expected: usize) -> Result<Table> {
             Error::whole(path, message)
         })
     };
-    let integers = |name: &str| npy::integers(path, npy::open(path, find(name)?)?);
-    let shape = integers("shape")?;
+    let numbers = |name: &str| npy::integers(path, npy::open(path, find(name)?)?, usize::MAX);
+    let indices = |name: &str| npy::integers(path, npy::open(path, find(name)?)?, u32::MAX);
+    let shape = numbers("shape")?;
     let [rows, columns] = shape[..] else {
         return Err(Error::whole(path, format!("found the shape {shape:?}, expected two numbers")));
     };
-    let count = Table::check_square(path, rows.max(0) as usize, columns.max(0) as usize, expected)?;
+    let count = Table::check_square(path, rows, columns, expected)?;
     let values = npy::floats(path, npy::open(path, find("data")?)?)?;
     // The word stands at the end of its array.
     let format = find("format")?;
@@ -95,37 +96,39 @@ pub fn read(path: &Path, bytes: &[u8], expected: usize) -> Result<Table> {
             format[format.len().saturating_sub(12)..].iter().copied().filter(|&b| b != 0).collect();
         letters.ends_with(word)
     };
-    let (major, minor) = if is(b"coo") {
-        (integers("row")?, integers("col")?)
-    } else if is(b"csr") || is(b"csc") {
-        let starts = integers("indptr")?;
-        let fits = starts.len() == count + 1
-            && starts[0] == 0
-            && starts.is_sorted()
-            && starts[count] == values.len() as i64;
-        if !fits {
-            return Err(Error::whole(path, "indptr does not rise from 0 to the number of entries"));
-        }
-        let lengths = starts.windows(2).map(|pair| (pair[1] - pair[0]) as usize);
-        let major =
-            lengths.enumerate().flat_map(|(k, length)| std::iter::repeat_n(k as i64, length)).collect();
-        (major, integers("indices")?)
-    } else {
+    let lengths_agree = |others: &[u32]| {
+        let differs = || Error::whole(path, "the lists of places and of values differ in length");
+        if others.len() == values.len() { Ok(()) } else { Err(differs()) }
+    };
+    if is(b"coo") {
+        let (rows, columns) = (indices("row")?, indices("col")?);
+        lengths_agree(&rows)?;
+        lengths_agree(&columns)?;
+        let places = rows.into_iter().zip(columns).zip(values);
+        let entries: Vec<_> = places.map(|((row, column), value)| (row, column, value)).collect();
+        return Table::from_entries(path, count, &entries);
+    }
+    if !is(b"csr") && !is(b"csc") {
         return Err(Error::whole(
             path,
             "expected a matrix in CSR, CSC or COO form; call .tocsr() before saving it",
         ));
-    };
-    if major.len() != values.len() || minor.len() != values.len() {
-        return Err(Error::whole(path, "the lists of places and of values differ in length"));
     }
-    let index = |k: i64| u32::try_from(k).unwrap_or(u32::MAX);
-    let places = major.into_iter().zip(minor).zip(values);
-    let entries =
-        places.map(
-            |((a, b), value)| {
-                if is(b"csc") { (index(b), index(a), value) } else { (index(a), index(b), value) }
-            },
-        );
-    Table::from_entries(path, count, entries.collect())
+    let starts = numbers("indptr")?;
+    let fits =
+        starts.len() == count + 1 && starts[0] == 0 && starts.is_sorted() && starts[count] == values.len();
+    if !fits {
+        return Err(Error::whole(path, "indptr does not rise from 0 to the number of entries"));
+    }
+    let minor = indices("indices")?;
+    lengths_agree(&minor)?;
+    if is(b"csr") {
+        return Table::from_rows(path, starts, minor, values);
+    }
+    // The lists of CSC are columns.
+    let columns = starts.windows(2).enumerate();
+    let columns = columns.flat_map(|(k, pair)| std::iter::repeat_n(k as u32, pair[1] - pair[0]));
+    let places = minor.into_iter().zip(columns).zip(values);
+    let entries: Vec<_> = places.map(|((row, column), value)| (row, column, value)).collect();
+    Table::from_entries(path, count, &entries)
 }

@@ -32,8 +32,9 @@ pub fn read(path: &Path, bytes: &[u8], expected: usize) -> Result<Table> {
     let end = bytes.windows(2).position(|pair| pair == b"\n\n");
     let end = end.ok_or_else(|| Error::whole(path, "no empty line ends the header"))?;
     let header = String::from_utf8_lossy(&bytes[..end]);
+    // Where several programs have written a field, the last one holds, as in Radiance itself.
     let field = |name: &str| {
-        let line = header.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix('='));
+        let line = header.lines().rev().find_map(|line| line.strip_prefix(name)?.strip_prefix('='));
         line.map(str::trim)
     };
     let size = |name: &str| {
@@ -81,6 +82,10 @@ pub fn read(path: &Path, bytes: &[u8], expected: usize) -> Result<Table> {
             return Err(Error::whole(path, message));
         }
     };
+    // An exposure says what all values were multiplied by; several multiply.
+    let exposures =
+        header.lines().filter_map(|line| line.strip_prefix("EXPOSURE=")?.trim().parse::<f64>().ok());
+    let exposure: f64 = exposures.product();
     let largest = values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let mut table = Table::empty();
     let rows = values.chunks_exact(count * components).enumerate();
@@ -95,7 +100,7 @@ pub fn read(path: &Path, bytes: &[u8], expected: usize) -> Result<Table> {
                 return Err(Error::whole(path, message));
             }
         }
-        table.push_row(entries.chunks_exact(components).map(|entry| entry[0]));
+        table.push_row(entries.chunks_exact(components).map(|entry| entry[0] / exposure));
     }
     Ok(table)
 }

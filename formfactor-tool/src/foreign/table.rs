@@ -1,7 +1,7 @@
 //! A table of factors in memory, and what formats are written from.
 
 use interchange::error::{Error, Result};
-use interchange::tool::progress;
+use interchange::tool::{ProgressBar, progress};
 use std::path::Path;
 
 /// Rows to be written, made as they are asked for.
@@ -45,30 +45,81 @@ impl Table {
     ///
     /// # Errors
     /// A place that does not exist, or one given twice.
-    pub fn from_entries(path: &Path, count: usize, mut entries: Vec<(u32, u32, f64)>) -> Result<Self> {
-        entries.sort_by_key(|&(row, column, _)| (row, column));
-        let place = |&(row, column, _): &(u32, u32, f64)| format!("row {}, column {}", row + 1, column + 1);
-        let outside =
-            |(row, column, _): &&(u32, u32, f64)| *row as usize >= count || *column as usize >= count;
-        if let Some(entry) = entries.iter().find(outside) {
-            return Err(Error::whole(path, format!("{}: the matrix has {count} rows", place(entry))));
-        }
-        if let Some(pair) = entries.windows(2).find(|pair| (pair[0].0, pair[0].1) == (pair[1].0, pair[1].1)) {
-            return Err(Error::whole(path, format!("{} is given twice", place(&pair[0]))));
-        }
-        let mut table = Self::empty();
-        let mut next = 0;
-        for row in progress("rows", count).wrap_iter(0..count) {
-            while let Some(&(_, column, value)) = entries.get(next).filter(|entry| entry.0 as usize == row) {
-                if value != 0.0 {
-                    table.columns.push(column);
-                    table.values.push(value);
-                }
-                next += 1;
+    pub fn from_entries(path: &Path, count: usize, entries: &[(u32, u32, f64)]) -> Result<Self> {
+        // Counted into their rows, which takes one look at each entry where sorting takes many.
+        let mut starts = vec![0usize; count + 1];
+        for &(row, column, _) in entries {
+            if row as usize >= count || column as usize >= count {
+                return Err(Error::whole(
+                    path,
+                    format!("{}: the matrix has {count} rows", place(row, column)),
+                ));
             }
-            table.starts.push(table.values.len());
+            starts[row as usize + 1] += 1;
         }
-        Ok(table)
+        (0..count).for_each(|row| starts[row + 1] += starts[row]);
+        let mut next = starts.clone();
+        let (mut columns, mut values) = (vec![0u32; entries.len()], vec![0.0; entries.len()]);
+        let bar = Steps::new("rows", entries.len());
+        for (done, &(row, column, value)) in entries.iter().enumerate() {
+            bar.at(done);
+            let at = &mut next[row as usize];
+            (columns[*at], values[*at]) = (column, value);
+            *at += 1;
+        }
+        Self::from_rows(path, starts, columns, values)
+    }
+
+    /// From the columns and values of rows one after another, with where each row starts and the last one ends. Columns
+    /// may come in any order, none twice in a row.
+    ///
+    /// # Errors
+    /// A column that does not exist, or one given twice.
+    pub fn from_rows(
+        path: &Path,
+        starts: Vec<usize>,
+        mut columns: Vec<u32>,
+        mut values: Vec<f64>,
+    ) -> Result<Self> {
+        let count = starts.len().saturating_sub(1);
+        let mut any_zero = false;
+        for row in progress("order", count).wrap_iter(0..count) {
+            let range = starts[row]..starts[row + 1];
+            let (columns, values) = (&mut columns[range.clone()], &mut values[range]);
+            if !columns.is_sorted() {
+                let mut pairs: Vec<(u32, f64)> =
+                    columns.iter().copied().zip(values.iter().copied()).collect();
+                pairs.sort_unstable_by_key(|&(column, _)| column);
+                for (k, (column, value)) in pairs.into_iter().enumerate() {
+                    (columns[k], values[k]) = (column, value);
+                }
+            }
+            if let Some(&column) = columns.last().filter(|column| **column as usize >= count) {
+                return Err(Error::whole(
+                    path,
+                    format!("{}: the matrix has {count} rows", place(row as u32, column)),
+                ));
+            }
+            if let Some(pair) = columns.windows(2).find(|pair| pair[0] == pair[1]) {
+                return Err(Error::whole(path, format!("{} is given twice", place(row as u32, pair[0]))));
+            }
+            any_zero |= values.contains(&0.0);
+        }
+        let table = Self { starts, columns, values, areas: Vec::new() };
+        Ok(if any_zero { table.without_zeros() } else { table })
+    }
+
+    fn without_zeros(self) -> Self {
+        let mut kept = Self { areas: self.areas.clone(), ..Self::empty() };
+        for row in 0..self.count() {
+            let (columns, values) = self.row(row);
+            for (&column, &value) in columns.iter().zip(values).filter(|(_, value)| **value != 0.0) {
+                kept.columns.push(column);
+                kept.values.push(value);
+            }
+            kept.starts.push(kept.values.len());
+        }
+        kept
     }
 
     /// Number of rows.
@@ -87,10 +138,34 @@ impl Table {
         (&self.columns[range.clone()], &self.values[range])
     }
 
-    /// An entry.
-    pub fn get(&self, row: usize, column: usize) -> f64 {
-        let (columns, values) = self.row(row);
-        columns.binary_search(&(column as u32)).map_or(0.0, |k| values[k])
+    /// The rows and columns `keys` (no key twice) in this order, and how many rows and entries without a key are left out.
+    pub fn of_elements(self, keys: &[u32]) -> (Self, usize) {
+        if keys.len() == self.count() && keys.is_sorted() {
+            return (self, 0);
+        }
+        let mut element_of = vec![u32::MAX; self.count()];
+        keys.iter().zip(0..).for_each(|(&key, element)| element_of[key as usize] = element);
+        let no_element = |key: usize| element_of[key] == u32::MAX;
+        let mut left_out =
+            (0..self.count()).filter(|&row| no_element(row) && !self.row(row).0.is_empty()).count();
+        let mut table = Self::empty();
+        for &key in keys {
+            let (columns, values) = self.row(key as usize);
+            let kept =
+                columns.iter().zip(values).map(|(&column, &value)| (element_of[column as usize], value));
+            let mut kept: Vec<(u32, f64)> = kept.filter(|&(column, _)| column != u32::MAX).collect();
+            left_out += columns.len() - kept.len();
+            kept.sort_unstable_by_key(|&(column, _)| column);
+            table.columns.extend(kept.iter().map(|&(column, _)| column));
+            table.values.extend(kept.iter().map(|&(_, value)| value));
+            table.starts.push(table.values.len());
+        }
+        (table, left_out)
+    }
+
+    /// Looks at entries whose column never falls from one look to the next in the same row.
+    pub fn ascending(&self) -> Ascending<'_> {
+        Ascending { table: self, next: self.starts[..self.count()].to_vec() }
     }
 
     /// Refuses any shape but the expected square, before anything of the found size is allocated.
@@ -101,6 +176,58 @@ impl Table {
         let message =
             format!("found {rows} rows and {columns} columns, expected {expected} of each, as the mesh has");
         Err(Error::whole(path, message))
+    }
+}
+
+fn place(row: u32, column: u32) -> String {
+    format!("row {}, column {}", row + 1, column + 1)
+}
+
+/// A place in each row that only moves on: every entry is passed once, where searching would look at many for each.
+#[derive(Debug, Clone)]
+pub struct Ascending<'a> {
+    table: &'a Table,
+    next: Vec<usize>,
+}
+
+impl Ascending<'_> {
+    /// An entry of a row, at or behind the columns that were asked for in this row before.
+    pub fn get(&mut self, row: usize, column: usize) -> f64 {
+        let mut found = 0.0;
+        self.before(row, column + 1, |other, value| {
+            if other == column {
+                found = value;
+            }
+        });
+        found
+    }
+
+    /// All entries of a row that were not passed yet, up to those before a column.
+    pub fn before(&mut self, row: usize, end: usize, mut each: impl FnMut(usize, f64)) {
+        let Self { table, next } = self;
+        let last = table.starts[row + 1];
+        let mut k = next[row];
+        while k < last && (table.columns[k] as usize) < end {
+            each(table.columns[k] as usize, table.values[k]);
+            k += 1;
+        }
+        next[row] = k;
+    }
+}
+
+/// A bar for so many small steps that even counting each would cost: it looks at every 4096th.
+pub(super) struct Steps(ProgressBar);
+
+impl Steps {
+    pub(super) fn new(title: &'static str, steps: usize) -> Self {
+        Self(progress(title, steps))
+    }
+
+    /// So many steps are done.
+    pub(super) fn at(&self, done: usize) {
+        if done.is_multiple_of(1 << 12) {
+            self.0.set_position(done as u64);
+        }
     }
 }
 
@@ -150,12 +277,30 @@ mod tests {
     fn entries_find_their_rows() {
         let path = Path::new("t.mtx");
         let table =
-            Table::from_entries(path, 3, vec![(2, 0, 0.5), (0, 1, 0.25), (2, 1, 0.0), (0, 0, 1.0)]).unwrap();
+            Table::from_entries(path, 3, &[(2, 0, 0.5), (0, 1, 0.25), (2, 1, 0.0), (0, 0, 1.0)]).unwrap();
         assert_eq!(table.row(0), (&[0, 1][..], &[1.0, 0.25][..]));
         assert_eq!(table.row(1), (&[][..], &[][..]));
-        assert_eq!((table.get(2, 0), table.get(2, 1), table.entries()), (0.5, 0.0, 3));
-        let twice = Table::from_entries(path, 3, vec![(1, 1, 0.5), (1, 1, 0.5)]).unwrap_err().to_string();
+        assert_eq!((table.row(2), table.entries()), ((&[0][..], &[0.5][..]), 3));
+        let twice = Table::from_entries(path, 3, &[(1, 1, 0.5), (1, 1, 0.5)]).unwrap_err().to_string();
         assert!(twice.contains("row 2, column 2 is given twice"), "{twice}");
-        assert!(Table::from_entries(path, 3, vec![(1, 3, 0.5)]).is_err());
+        let outside = Table::from_entries(path, 3, &[(1, 3, 0.5)]).unwrap_err().to_string();
+        assert!(outside.contains("row 2, column 4: the matrix has 3 rows"), "{outside}");
+        assert!(Table::from_rows(path, vec![0, 1], vec![1], vec![0.5]).is_err());
+    }
+
+    #[test]
+    fn looks_that_move_on_find_every_entry() {
+        let entries = [(0, 1, 0.25), (0, 2, 0.5), (2, 0, 0.125), (2, 2, 1.0)];
+        let table = Table::from_entries(Path::new("t.mtx"), 3, &entries).unwrap();
+        let full = |row: usize, column: usize| {
+            let found = entries.iter().find(|entry| (entry.0 as usize, entry.1 as usize) == (row, column));
+            found.map_or(0.0, |entry| entry.2)
+        };
+        let mut looks = table.ascending();
+        for column in 0..3 {
+            for row in 0..3 {
+                assert_eq!(looks.get(row, column), full(row, column), "{row} {column}");
+            }
+        }
     }
 }

@@ -4,6 +4,7 @@
 use flate2::read::DeflateDecoder;
 use interchange::error::{Error, Result};
 use interchange::tool::progress;
+use std::borrow::Cow;
 use std::io::{Read, Write};
 use std::path::Path;
 
@@ -69,11 +70,11 @@ pub(super) fn write(out: &mut dyn Write, entries: &[(&str, Vec<u8>)]) -> std::io
     out.write_all(&[0; 2])
 }
 
-/// All entries of an archive with their names.
+/// All entries of an archive with their names; those that are stored as they are stay where they are.
 ///
 /// # Errors
 /// The archive is damaged, encrypted, larger than 4 GiB or compressed in another way.
-pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Vec<(String, Vec<u8>)>> {
+pub(super) fn read<'a>(path: &Path, bytes: &'a [u8]) -> Result<Vec<(String, Cow<'a, [u8]>)>> {
     let damaged = |what: &str| Error::whole(path, format!("the archive is damaged: {what}"));
     let short = |at: usize| bytes.get(at..at + 2).map(|b| usize::from(u16::from_le_bytes([b[0], b[1]])));
     let word = |at: usize| bytes.get(at..at + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
@@ -106,14 +107,10 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Vec<(String, Vec<u8>)>> 
         let start = local + LOCAL_LENGTH + own;
         let content = bytes.get(start..start + packed as usize).ok_or_else(missing)?;
         let content = match method as u16 {
-            STORED => content.to_vec(),
+            STORED => Cow::Borrowed(content),
             DEFLATED => {
-                let mut plain = Vec::new();
-                // One byte more than said, so that a longer entry is found out and not unpacked without end.
-                let unpacked =
-                    DeflateDecoder::new(content).take(u64::from(length) + 1).read_to_end(&mut plain);
-                unpacked.map_err(|e| damaged(&format!("{name}: {e}")))?;
-                plain
+                let plain = inflated(content, length as usize);
+                Cow::Owned(plain.map_err(|e| damaged(&format!("{name}: {e}")))?)
             }
             other => {
                 return Err(damaged(&format!("{name} is compressed by method {other}, which is not read")));
@@ -125,6 +122,18 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Vec<(String, Vec<u8>)>> 
         entries.push((name, content));
     }
     Ok(entries)
+}
+
+/// What an entry of `length` bytes was before it was deflated. One byte more than said is unpacked where there is more, so
+/// that a longer entry is found out and not unpacked without end.
+fn inflated(content: &[u8], length: usize) -> std::io::Result<Vec<u8>> {
+    let mut source = DeflateDecoder::new(content).take(length as u64 + 1);
+    let mut plain = Vec::new();
+    let bar = progress("unpack", length / PART + 1);
+    while source.by_ref().take(PART as u64).read_to_end(&mut plain)? > 0 {
+        bar.inc(1);
+    }
+    Ok(plain)
 }
 
 #[cfg(test)]
@@ -139,7 +148,7 @@ mod tests {
         write(&mut bytes, &entries).unwrap();
         let path = Path::new("t.npz");
         let found = read(path, &bytes).unwrap();
-        assert_eq!(found[0], ("a.npy".to_owned(), b"some bytes".to_vec()));
+        assert_eq!((found[0].0.as_str(), &*found[0].1), ("a.npy", &b"some bytes"[..]));
         assert_eq!((found.len(), found[1].1.len()), (2, 0));
         for cut in 0..bytes.len() {
             assert!(read(path, &bytes[..cut]).is_err(), "{cut}");

@@ -121,7 +121,12 @@ pub fn picture(matrix: &Matrix) -> Result<Canvas> {
     };
     for (kind, name, colour) in KINDS {
         let number = views.iter().filter(|view| view.block.kind() == Ok(kind)).count();
-        entry(&mut canvas, colour, [110; 3], &format!("{number} {name} blocks"));
+        entry(
+            &mut canvas,
+            colour,
+            [110; 3],
+            &format!("{number} {name} {}", if number == 1 { "block" } else { "blocks" }),
+        );
     }
     entry(&mut canvas, ZERO, ZERO, "stored as zero");
     entry(&mut canvas, ABSENT, ABSENT, "in no block: zero");

@@ -80,7 +80,7 @@ pub fn draw(paths: &[impl AsRef<Path>], request: &Request<'_>, output: &Path) ->
     if png {
         return painted.picture(&mesh, DVec3::from_array(request.from)).write(output).map(|_| ());
     }
-    foreign::write(output, &painted.surface(&mesh)).map(|_| ())
+    foreign::write(output, &painted.surface(&mesh), None).map(|_| ())
 }
 
 struct Painted {

@@ -4,6 +4,7 @@
 //! count (Radiance reference manual, "Scene description").
 
 use super::Surface;
+use crate::counted::counted;
 use crate::error::{Error, Result};
 use crate::materials::Material;
 use std::collections::{BTreeMap, HashMap};
@@ -29,7 +30,8 @@ pub fn read(path: &Path) -> Result<(Surface, Vec<String>)> {
     let mut said: Vec<String> =
         scene.left_out.iter().map(|(kind, count)| format!("left out: {count} of type {kind}")).collect();
     said.extend(scene.simplified.iter().map(|(kind, count)| {
-        format!("{count} materials of type {kind}: only what they reflect diffusely is kept")
+        let materials = counted(*count, "material", "materials");
+        format!("{materials} of type {kind}: only what is reflected diffusely is kept")
     }));
     Ok((scene.surface, said))
 }

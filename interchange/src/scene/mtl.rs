@@ -3,6 +3,7 @@
 
 use super::NONE;
 use super::statement::{Statement, UnknownKeywords, decode, shown, statements};
+use crate::counted::counted;
 use crate::error::{Error, Result};
 use crate::materials::{Material, MaterialTable};
 use std::collections::HashMap;
@@ -88,7 +89,8 @@ impl Library {
         self.warnings.extend(textures.map(|(line, count)| {
             let path = path.display();
             format!(
-                "{path}:{line}: textures are ignored ({count} lines); surfaces have the plain Kd, Ke and Ks"
+                "{path}:{line}: textures are ignored ({}); surfaces have the plain Kd, Ke and Ks",
+                counted(count, "line", "lines")
             )
         }));
         Ok(())

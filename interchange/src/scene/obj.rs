@@ -6,6 +6,7 @@ use super::obj_scan::{self, Scan};
 use super::settings::Located;
 use super::statement::{decode, shown};
 use super::{NONE, Scene, SceneFace, polygons};
+use crate::counted::counted;
 use crate::digest::Digest;
 use crate::error::{Error, Result, nearest_name};
 use crate::ids::{GroupId, MaterialId};
@@ -117,7 +118,10 @@ fn bright_materials(used: &[String], library: &Library) -> Option<String> {
     let bright: Vec<_> = entries.filter(|(_, entry)| bright(&entry.material)).collect();
     let (name, first) = bright.first()?;
     let place = format!("{}:{}: material {}", first.file.display(), first.line, shown(name));
-    let others = if bright.len() > 1 { format!(" (and {} others)", bright.len() - 1) } else { String::new() };
+    let others = match bright.len() - 1 {
+        0 => String::new(),
+        count => format!(" (and {})", counted(count, "other", "others")),
+    };
     Some(format!("{place}{others}: Kd + Ks exceeds 1 in a channel; a stage that uses Ks would create energy"))
 }
 

@@ -1,5 +1,6 @@
 //! Statements of OBJ and MTL text (Wavefront "Object Files", version 3.0): decoding, continuation lines, comments.
 
+use crate::counted::counted;
 use crate::error::{Error, Result};
 use std::borrow::Cow;
 use std::path::Path;
@@ -164,8 +165,12 @@ impl UnknownKeywords {
             })
             .collect();
         if self.further > 0 {
-            warnings
-                .push(format!("{path}: {} further lines with unknown statements are ignored", self.further));
+            let those = counted(
+                self.further,
+                "further line with an unknown statement is ignored",
+                "further lines with unknown statements are ignored",
+            );
+            warnings.push(format!("{path}: {those}"));
         }
         warnings
     }

@@ -129,7 +129,7 @@ fn kd_and_ks_beyond_one_is_one_warning_about_used_materials() {
     );
     let scene = read_in(&folder(&obj, &[("m.mtl", mtl)]), &[]).unwrap();
     assert_eq!(scene.warnings.len(), 1);
-    assert!(scene.warnings[0].contains("m.mtl:4: material b (and 1 others): Kd + Ks exceeds 1"));
+    assert!(scene.warnings[0].contains("m.mtl:4: material b (and 1 other): Kd + Ks exceeds 1"));
 }
 
 #[test]
