@@ -86,6 +86,14 @@ pub fn fill_bounds(report: &mut Report, bounded: &Bounded, mesh: &Mesh) {
 pub fn missed(solved: &Solved, tolerance: f64, matrix: &MatrixRecord) -> Option<String> {
     let bounds = CHANNEL_NAMES.iter().zip(&solved.channels);
     let worst = bounds.max_by(|a, b| a.1.bound.total_cmp(&b.1.bound)).filter(|(_, c)| c.bound > tolerance);
+    if let Some((name, channel)) = worst.filter(|(_, channel)| channel.bound.is_infinite()) {
+        return Some(format!(
+            "no bound on the solver's error could be proved in the {name} channel, so none below the asked {tolerance:e}: \
+             light may grow by interreflection; the best iterate was written (its residual {}); darker materials, or a \
+             matrix whose row sums are at most 1, have a bound",
+            channel.end.describe()
+        ));
+    }
     if let Some((name, channel)) = worst {
         return Some(format!(
             "the bound on the solver's error {} at {:.1e} in the {name} channel, above the asked {tolerance:e}; the best \

@@ -24,6 +24,18 @@ pub enum SolveError {
         /// Name of the channel.
         channel: &'static str,
     },
+    /// The same, where the matrix is not symmetric and only the answer shows it.
+    #[error(
+        "no finite solution in the {channel} channel: what is reflected comes out below 0, so the rows of the matrix give \
+         back as much light as the surfaces absorb, or more (an element sees a mean reflectance of {norm:.3}); use a \
+         matrix whose row sums are at most 1, or make the brightest materials darker"
+    )]
+    Gaining {
+        /// Name of the channel.
+        channel: &'static str,
+        /// Largest column of K, relative to the areas.
+        norm: f64,
+    },
     /// A matrix in a form that this solver does not take.
     #[error("{path}: {found}; {remedy}")]
     Unsupported {

@@ -69,7 +69,15 @@ pub fn describe(path: &Path, as_json: bool) -> interchange::Result<String> {
         if let (Some(emitted), Some(absorbed), Some(escaped)) =
             (estimate("power emitted"), estimate("power absorbed"), estimate("power escaped"))
         {
-            line("", format!("power {emitted:.6e} = absorbed {absorbed:.6e} + escaped {escaped:.6e}"));
+            let under_way = estimate("power under way").filter(|&power| power != 0.0);
+            let under_way = under_way.map_or(String::new(), |power| format!(" + under way {power:.6e}"));
+            let defect = estimate("energy defect").unwrap_or(0.0);
+            line(
+                "",
+                format!(
+                    "power {emitted:.6e} = absorbed {absorbed:.6e} + escaped {escaped:.6e}{under_way}, defect {defect:.1e}"
+                ),
+            );
         }
     }
     if let Some([lower, upper]) = &details.bounds {

@@ -49,13 +49,15 @@ pub(crate) struct PartChannel {
 /// What came out for one channel.
 #[derive(Debug)]
 pub(crate) struct PartSolution {
-    /// F B of the last iterate, on the part's elements.
+    /// F B of the last iterate, on the part's elements; at least 0 where that is known of the truth.
     pub irradiance: Vec<f64>,
     pub history: Vec<f64>,
     pub end: End,
     pub amplification: Amplification,
     /// Power emitted in the part, W.
     pub emitted: f64,
+    /// Irradiances that came out below 0 and were raised to it.
+    pub raised: usize,
 }
 
 /// What came out for the part.
@@ -218,10 +220,23 @@ pub(crate) fn solve_part(
         }
     }
 
+    // With light only given and every bounce of it dying away nothing could have come out below 0.
+    let emits_only: Vec<bool> =
+        channels.iter().map(|channel| channel.exitance.iter().all(|&e| e >= 0.0)).collect();
+    for (c, channel) in channels.iter().enumerate() {
+        let proved = amplifications[c].factor.is_finite();
+        let reflected: f64 =
+            (0..areas.len()).map(|i| areas[i] * reflectances[c][i] * irradiances[c][i]).sum();
+        if !proved && emits_only[c] && reflected < 0.0 {
+            return Err(SolveError::Gaining { channel: channel.name, norm: norms[c] });
+        }
+    }
+
     products += most_steps - work.steps_left;
     let history = std::mem::take(&mut work.history);
     let outcome = (0..channels.len()).map(|c| {
         let known = amplifications[c].factor.is_finite();
+        let raised = if known && emits_only[c] { raise_to_zero(&mut irradiances[c]) } else { 0 };
         let noted = |measure: f64| if known { measure } else { f64::INFINITY };
         PartSolution {
             irradiance: std::mem::take(&mut irradiances[c]),
@@ -234,6 +249,7 @@ pub(crate) fn solve_part(
             },
             amplification: amplifications[c],
             emitted: emitted[c],
+            raised,
         }
     });
     Ok(Outcome {
@@ -243,6 +259,16 @@ pub(crate) fn solve_part(
         bound_products,
         entries_read: inner.entries_read(),
     })
+}
+
+/// Raises irradiances below 0 to 0 and counts them: iterates swing about the truth, and in a dark corner farther than
+/// what there is.
+///
+/// Where nothing draws light out and the bounces are proved to die away, the truth is a sum of bounces, each at least 0.
+/// So no element gets farther from it, and the bound stands. Another sweep would not do: it passes a negative on.
+fn raise_to_zero(irradiance: &mut [f64]) -> usize {
+    let below = irradiance.iter_mut().filter(|h| **h < 0.0);
+    below.map(|h| *h = 0.0).count()
 }
 
 /// Starts from an older irradiance, stretched so that what is left of the residual has no part along it: after a change

@@ -155,6 +155,7 @@ struct Run<'a> {
     products: usize,
     bound_products: usize,
     entries_read: u64,
+    raised: usize,
 }
 
 impl<'a> Run<'a> {
@@ -177,6 +178,7 @@ impl<'a> Run<'a> {
             products: 0,
             bound_products: 0,
             entries_read: 0,
+            raised: 0,
         }
     }
 
@@ -297,6 +299,7 @@ impl<'a> Run<'a> {
         for i in (0..members.len()).filter(|&i| members[i]) {
             whole.irradiance[i] = part.irradiance[i];
         }
+        self.raised += part.raised;
         if part.end != End::Converged {
             whole.end = part.end;
         }
@@ -332,6 +335,7 @@ impl<'a> Run<'a> {
         counters.push(("parts solved apart".into(), self.parts));
         counters.push(("products".into(), self.products));
         counters.push(("products for bounds".into(), self.bound_products));
+        counters.push(("irradiances raised to 0".into(), self.raised));
         let left_out = self.system.product.entries_read().saturating_sub(self.entries_read);
         counters.push(("entries left out of a step".into(), left_out as usize));
     }

@@ -255,6 +255,27 @@ fn a_matrix_without_symmetry_is_solved_by_gmres_and_refused_by_others() {
     assert_all_close(&product().apply_transposed(&[&x]).swap_remove(0), &want, 1e-13);
 }
 
+/// Rows that give back more than the surfaces absorb: with 1.1 x 1.2 x 0.95^2 > 1 the equations have one solution, and
+/// it is below 0. Where only one row exceeds 1 light still dies away.
+#[test]
+fn a_matrix_without_symmetry_that_creates_light_is_refused() {
+    let areas = [1.0, 1.0];
+    let of = |there: f64, back: f64| {
+        let blocks = [Block::new(BlockKind::Dense, 0..2, 0..2, 0)];
+        let values = [0.0, there, back, 0.0];
+        let product = Product::from_blocks(2, false, &blocks, Values::F64(&values));
+        let system = System::from_parts(product, &areas, &[0.0; 2], 0.0);
+        solve(&system, &grey(&[0.95; 2], &[1.0, 0.0]), Solver::Auto, 1e-6)
+    };
+    let error = of(1.2, 1.1).unwrap_err();
+    assert!(matches!(error, SolveError::Gaining { channel: "red", .. }), "{error}");
+    assert!(error.to_string().contains("row sums are at most 1"), "{error}");
+    // B1 = 1 / (1 - 0.95^2 x 1.2 x 0.5), B2 = 0.95 x 0.5 B1.
+    let solved = of(1.2, 0.5).unwrap();
+    let first = 1.0 / (1.0 - 0.95 * 0.95 * 1.2 * 0.5);
+    assert_all_close(&solved.channels[0].radiosity, &[first, 0.95 * 0.5 * first], 1e-5);
+}
+
 /// The limit ends the iteration with the best iterate and says so; the answer is as far as its bound says.
 #[test]
 fn a_limit_on_steps_keeps_the_best_iterate() {

@@ -311,6 +311,9 @@ fn bounces_are_counted_from_the_emission() {
         assert!(
             (sum - estimate("power emitted green")).abs() < 1e-12 && estimate("energy defect green") < 1e-12
         );
+        // Without what is under way the balance that is shown would not be one.
+        let words = text(&room, &["info", "room.sol"]);
+        assert_eq!(words.matches("+ under way").count(), 3, "{words}");
     }
 }
 

@@ -7,8 +7,10 @@ use common::{Scene, assert_all_close, channel, grey, random, random_scene};
 use interchange::matrix::{BlockKind, PackedBlock, Precision, Values};
 use proptest::prelude::*;
 use solve_tool::bound::{Amplification, Proof};
+use solve_tool::bounds;
 use solve_tool::components::Components;
 use solve_tool::error::SolveError;
+use solve_tool::interval::Spread;
 use solve_tool::product::Product;
 use solve_tool::solve::{Solver, solve};
 
@@ -148,6 +150,49 @@ fn extreme_reflectances_and_scales_are_solved() {
         let scaled: Vec<f64> = lit.iter().map(|b| b / light).collect();
         assert_all_close(&scaled, &plain, 1e-14);
     }
+}
+
+/// Iterates of conjugate gradients swing about the truth: down a passage they come out below 0. Raised to 0 they are
+/// nearer to the truth in every element, so the bound stands, and no radiosity is below its lower bound.
+#[test]
+fn irradiances_are_never_below_0() {
+    // Elements in a row, each between two others, the first of which glows.
+    let n = 40;
+    let scene = Scene::new(vec![1.0; n], |i, j| if i.abs_diff(j) == 1 { 0.5 } else { 0.0 });
+    let e: Vec<f64> = (0..n).map(|i| if i == 0 { 1.0 } else { 0.0 }).collect();
+    let emitted: f64 = e.iter().zip(&scene.areas).map(|(e, area)| e * area).sum();
+    let mut raised = 0;
+    for brightest in [0.2, 0.5, 0.8] {
+        let rho: Vec<f64> = (0..n).map(|i| if i % 5 == 3 { 0.3 * brightest } else { brightest }).collect();
+        let exact = scene.radiosity(&rho, &e);
+        for tolerance in [0.3, 0.1, 0.03, 0.01, 1e-3, 1e-9] {
+            let solved = scene.solve(&grey(&rho, &e), Solver::Cg, tolerance).unwrap();
+            let counted = solved.counter("irradiances raised to 0");
+            println!("rho {brightest}, tolerance {tolerance}: {counted} raised");
+            raised += counted;
+            let channel = &solved.channels[0];
+            let error = |i: usize| channel.radiosity[i] - exact[i];
+            let wrong: f64 = (0..n).map(|i| scene.areas[i] * error(i).abs()).sum();
+            assert!(wrong <= channel.bound * emitted + 1e-12, "{wrong} > {}", channel.bound * emitted);
+            assert!(channel.irradiance.iter().all(|&h| h >= 0.0));
+            assert!((0..n).all(|i| channel.radiosity[i] >= e[i]));
+            let bounded =
+                scene.with_system(|system| bounds::find(system, &grey(&rho, &e), &solved, &[], Spread::Rows));
+            for (i, b) in channel.radiosity.iter().enumerate() {
+                let (lower, upper) = (bounded.lower[0][i], bounded.upper[0][i]);
+                assert!(lower <= *b && *b <= upper, "{i}: {b} outside [{lower}, {upper}]");
+                let truth = exact[i];
+                assert!(lower <= truth + 1e-12 && truth <= upper + 1e-12, "{i}: {truth}");
+            }
+        }
+    }
+    assert!(raised > 0, "no iterate was below 0: the test shows nothing");
+
+    // Where light is drawn out, below 0 is an answer like any other.
+    let sink: Vec<f64> = e.iter().map(|e| -e).collect();
+    let drawn = scene.solve(&grey(&vec![0.5; n], &sink), Solver::Cg, 0.01).unwrap();
+    assert_eq!(drawn.counter("irradiances raised to 0"), 0);
+    assert!(drawn.channels[0].irradiance.iter().any(|&h| h < 0.0));
 }
 
 #[test]
