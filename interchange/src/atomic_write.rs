@@ -1,5 +1,6 @@
 //! Writing a file so that nobody ever sees half of it: beside the target, synced, renamed. Output identical to
-//! the file that is already there leaves that file alone, time stamp included, so that `make` can stop there.
+//! the file that is already there leaves that file alone, time stamp included, so that `make` can stop there. A file
+//! that may only be read is replaced as any other, and may only be read again: what counts is whether its folder can be written.
 
 use crate::error::{Error, Result};
 use crate::interrupt;
@@ -283,5 +284,19 @@ mod tests {
         std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o640)).unwrap();
         write_bytes(&path, b"two").unwrap();
         assert_eq!(mode(&path), 0o640);
+    }
+
+    /// Renaming asks for the right to write the folder, not the file.
+    #[cfg(unix)]
+    #[test]
+    fn a_read_only_file_is_replaced_and_stays_read_only() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        write_bytes(&path, b"old").unwrap();
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o444)).unwrap();
+        assert_eq!(write_bytes(&path, b"new").unwrap(), Outcome::Written);
+        assert_eq!(std::fs::read(&path).unwrap(), b"new");
+        assert_eq!(std::fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o444);
     }
 }

@@ -461,7 +461,7 @@ mod tests {
         let path = folder.path().join("a.mesh");
         sample(&path);
         let message = File::<u32>::open(&path, Kind::Matrix).unwrap_err().to_string();
-        assert!(message.contains("found a mesh") && message.contains("formfactor-tool compute"), "{message}");
+        assert!(message.contains("found a mesh") && message.contains("mesh-tool info"), "{message}");
         let mut newer = std::fs::read(&path).unwrap();
         newer[8] = 9;
         std::fs::write(&path, newer).unwrap();

@@ -73,7 +73,7 @@ impl Error {
             std::io::ErrorKind::NotFound => nearest_file(path)
                 .map(|near| format!("; did you mean {}?", near.display()))
                 .unwrap_or_else(|| "; check the path".into()),
-            std::io::ErrorKind::StorageFull => {
+            std::io::ErrorKind::StorageFull | std::io::ErrorKind::QuotaExceeded => {
                 "; free some space and run again (an older output is untouched)".into()
             }
             std::io::ErrorKind::FileTooLarge => {
@@ -81,6 +81,9 @@ impl Error {
             }
             std::io::ErrorKind::PermissionDenied => {
                 "; check the permissions of the file and its folder".into()
+            }
+            std::io::ErrorKind::ReadOnlyFilesystem => {
+                "; choose a folder that can be written, or mount this one for writing (an older output is untouched)".into()
             }
             _ => String::new(),
         };
@@ -167,6 +170,14 @@ fn edit_distance(a: &str, b: &str) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_place_that_takes_no_more_is_told_with_what_helps() {
+        let said =
+            |kind: std::io::ErrorKind| Error::io(Path::new("m.ff"), "write beside", kind.into()).to_string();
+        assert!(said(std::io::ErrorKind::ReadOnlyFilesystem).contains("choose a folder that can be written"));
+        assert!(said(std::io::ErrorKind::QuotaExceeded).contains("free some space"));
+    }
 
     #[test]
     fn a_wrong_ending_is_told_with_the_name_that_was_meant() {

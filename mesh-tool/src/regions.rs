@@ -11,7 +11,7 @@ use geometry::plane::Plane;
 use geometry::polygon;
 use interchange::ids::GroupId;
 use interchange::report::Report;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// A ring turns by less than this at corners that are left out, in radians; far below what a shadow can tell.
 const STRAIGHT: f64 = 1e-10;
@@ -210,7 +210,11 @@ fn placed(graph: &PlanarGraph, ring: &[u32], scene: &mut Cleaned) -> Vec<u32> {
     without_repeats(ring.iter().map(place).collect())
 }
 
+/// A ring without the corners it runs straight on at. Where it comes by more than once, at the ends of its seams, it
+/// keeps them: left out on the way there but not on the way back, such a corner would take a triangle along.
 fn without_straight(graph: &PlanarGraph, mut ring: Vec<u32>) -> Vec<u32> {
+    let mut visits: HashMap<u32, u32> = HashMap::new();
+    ring.iter().for_each(|&point| *visits.entry(point).or_default() += 1);
     let mut k = 0;
     while k < ring.len() && ring.len() > 3 {
         let n = ring.len();
@@ -219,11 +223,45 @@ fn without_straight(graph: &PlanarGraph, mut ring: Vec<u32>) -> Vec<u32> {
         let (before, after) = (b - a, c - b);
         let limit = (STRAIGHT * before.length() * after.length()).max(FLAT * a.distance(c));
         let straight = before.perp_dot(after).abs() <= limit;
-        if straight && before.dot(after) > 0.0 {
+        if straight && before.dot(after) > 0.0 && visits[&ring[k]] == 1 {
             ring.remove(k);
         } else {
             k += 1;
         }
     }
     ring
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::planar::Point;
+    use glam::DVec2;
+
+    /// The seam meets the hole at a corner that lies nearly on the line from its other end to the next one: by less
+    /// than `FLAT`, so it would be left out on the way there. The rim's straight corner is.
+    #[test]
+    fn seam_comes_back_by_the_corner_it_went_by() {
+        let mut graph = PlanarGraph::default();
+        let rim = [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+        let hole = [(0.25, 0.25), (0.25 + 1e-7, 0.25 + 1e-7 + 4e-11), (0.25 + 1e-7, 0.25)];
+        let points: Vec<u32> = rim
+            .iter()
+            .chain(&hole)
+            .map(|&(x, y)| {
+                let uv = DVec2::new(x, y);
+                graph.point(Point { uv, position: uv.extend(0.0), place: None })
+            })
+            .collect();
+        let ring: Vec<u32> = [0, 5, 6, 7, 5, 0, 1, 2, 3, 4].map(|k: usize| points[k]).to_vec();
+        let area = |ring: &[u32]| -> f64 {
+            let at = |k: usize| graph.points[ring[k % ring.len()] as usize].uv;
+            0.5 * (0..ring.len()).map(|k| at(k).perp_dot(at(k + 1))).sum::<f64>()
+        };
+        let kept = without_straight(&graph, ring);
+        assert_eq!(kept, [0, 5, 6, 7, 5, 0, 2, 3, 4].map(|k: usize| points[k]));
+        // A square less half one of 1e-7 (and 4e-11); ten products of at most one, each rounded.
+        assert!((area(&kept) - (1.0 - 0.5e-14)).abs() < 10.0 * f64::EPSILON, "{}", area(&kept) - 1.0);
+    }
 }

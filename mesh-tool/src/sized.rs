@@ -125,6 +125,8 @@ pub fn sized(
 /// Says that there are more elements than asked for, where there are many more.
 fn warn_of_more(found: f64, asked: f64, report: &mut Report) {
     if found > MANY_MORE * asked {
-        report.warn(format!("the faces and lines need about {found} elements, more than the {asked} asked for"));
+        report.warn(format!(
+            "the faces and lines need about {found} elements, more than the {asked} asked for"
+        ));
     }
 }

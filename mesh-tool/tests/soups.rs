@@ -159,3 +159,15 @@ fn soups_that_failed_survive() {
         }
     }
 }
+
+/// Found by the fuzz target `arrangement`: a wall with a hole of 1e-6, whose seam went to the hole past a corner nearly on
+/// its line and came back by it. The border of the wall left out the triangle between, 1.2e-11 of its area.
+#[test]
+fn seam_to_a_tiny_hole_keeps_its_corner() {
+    let soup = Soup::from_bytes(
+        b"\x00\x00-\x19\x9432\xff\x00\x01\x04t7\x00\x00\xc3\x05\x1f\xff\xff\xff\xff\xff\xff\xff.\xe2\x11\x09\x159cB\xcf\
+          \xff\x8c\xff\x00\x01\x04t7\x00\x00\xc3\x05\x1f\xff\xff\xff\xff\xff\xff\xff.\xe2\x11\x09\x159c\xdd",
+    );
+    let faults = soup.faults();
+    assert!(faults.is_empty(), "{soup:?}: {faults:#?}");
+}

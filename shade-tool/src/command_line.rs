@@ -153,8 +153,8 @@ pub struct RenderArguments {
     /// Samples along each side of a pixel
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=64))]
     pub samples: u32,
-    /// Samples along each side of a pixel that the border of a surface crosses, rounded to a multiple of --samples (default: as
-    /// --tolerance asks for, at least --samples)
+    /// Samples along each side of a pixel that the border of a surface crosses, rounded to a multiple of --samples; three
+    /// times as many at a lamp's, 64 at most, but for N up to --samples (default: as --tolerance asks for)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=256))]
     pub border_samples: Option<u32>,
     /// Local models.

@@ -62,7 +62,7 @@ mod tests {
         let middle = DVec3::new(2.0, 2.0, 0.0);
         let camera =
             Camera::new(middle + DVec3::Z, middle, DVec3::Y, Lens::Orthographic(8.0), [16, 16]).unwrap();
-        let sampler = PixelSampler::new(&surface, &camera, Sampling { each: 2, in_cell: 1 });
+        let sampler = PixelSampler::new(&surface, &camera, Sampling { each: 2, in_cell: 1, at_lamps: 1 });
         let mut extents = [Extent::default(); 5];
         (0..16).for_each(|row| extend(&mut extents, &sampler.row(row, 0..16), row));
         assert_eq!(extents.map(|extent| extent.is_seen()), [true, true, true, true, false]);

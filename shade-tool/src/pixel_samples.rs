@@ -13,13 +13,19 @@ pub struct Sampling {
     pub each: usize,
     /// Samples along each side of a cell where borders are seen; a pixel has [`Sampling::each`] squared cells.
     pub in_cell: usize,
+    /// The same where a lamp is on one side of the border.
+    pub at_lamps: usize,
 }
 
 /// Samples along each side of a pixel that keep its coverage good enough for a tolerance of 0.04.
 const SIDE: f64 = 12.0;
 const SIDE_TOLERANCE: f64 = 0.04;
-/// Most samples along each side of a pixel that a tolerance asks for.
+/// Most samples along each side of a pixel that a tolerance asks for, and most at the border of a lamp.
 const MOST: f64 = 32.0;
+const MOST_AT_LAMPS: f64 = 64.0;
+/// So many times the samples along each side at the borders of lamps: those are some ten times brighter than what they light, and the
+/// error falls by 3^(3/2). Few pixels are such.
+const TIMES_AT_LAMPS: f64 = 3.0;
 
 impl Sampling {
     /// As many at borders as a tolerance asks for, or the given number.
@@ -30,7 +36,12 @@ impl Sampling {
     pub fn new(each: usize, at_borders: Option<usize>, tolerance: f64) -> Sampling {
         let by_tolerance = (SIDE * (SIDE_TOLERANCE / tolerance).powf(2.0 / 3.0)).min(MOST);
         let side = at_borders.map_or(by_tolerance, |side| side as f64);
-        Sampling { each, in_cell: (side / each as f64).round().max(1.0) as usize }
+        let per_cell = |side: f64| (side / each as f64).round().max(1.0) as usize;
+        let in_cell = per_cell(side);
+        // Whoever asks for no more samples at borders than elsewhere gets no more.
+        let is_off = at_borders.is_some() && in_cell == 1;
+        let at_lamps = if is_off { 1 } else { per_cell((TIMES_AT_LAMPS * side).min(MOST_AT_LAMPS)).max(in_cell) };
+        Sampling { each, in_cell, at_lamps }
     }
 }
 
@@ -139,7 +150,7 @@ impl<'a> PixelSampler<'a> {
         (met, groups): (&mut Vec<(Met, [f64; 2])>, &mut Vec<Group>),
         row: &mut RowSamples,
     ) {
-        let Sampling { each, in_cell } = self.sampling;
+        let Sampling { each, in_cell, at_lamps } = self.sampling;
         let place = |[x, y]: [f64; 2]| [corner[0] + x, corner[1] + y];
         met.clear();
         met.extend((0..each * each).map(|k| {
@@ -147,8 +158,9 @@ impl<'a> PixelSampler<'a> {
             (self.surface.met(self.camera, at), at)
         }));
         row.rays += met.len();
-        let mut others = met.iter().map(|(met, _)| met).chain(corners.as_flattened());
-        let is_border = others.any(|other| !self.surface.is_one_surface(&met[0].0, other));
+        let all = || met.iter().map(|(met, _)| met).chain(corners.as_flattened());
+        let is_border = all().any(|other| !self.surface.is_one_surface(&met[0].0, other));
+        let in_cell = if all().any(|met| self.surface.emits(met)) { at_lamps } else { in_cell };
         row.borders += usize::from(is_border);
         let share = 1.0 / (each * each) as f64;
         if !is_border || in_cell == 1 {
@@ -224,6 +236,10 @@ mod tests {
         assert_eq!(Sampling::new(4, Some(16), 0.5).in_cell, 4);
         assert_eq!(Sampling::new(4, Some(1), 0.01).in_cell, 1);
         assert_eq!(Sampling::new(64, None, 0.01).in_cell, 1);
+        let at_lamps = |tolerance: f64| Sampling::new(4, None, tolerance).at_lamps;
+        assert_eq!([0.5, 0.1, 0.04, 0.02, 0.01, 1e-9].map(at_lamps), [2, 5, 9, 14, 16, 16]);
+        assert_eq!(Sampling::new(4, Some(16), 0.5).at_lamps, 12);
+        assert_eq!(Sampling::new(4, Some(4), 0.01).at_lamps, 1);
     }
 
     /// A half plane seen straight, its border turned by an irrational angle: the covered part of each pixel against its exact value,
@@ -240,7 +256,7 @@ mod tests {
         let camera = Camera::new(eye, DVec3::ZERO, DVec3::Y, Lens::Orthographic(9.0), [9, 9]).unwrap();
         let mut largest = [0.0f64; 2];
         for (in_cell, largest) in [1, 4].into_iter().zip(&mut largest) {
-            let sampler = PixelSampler::new(&surface, &camera, Sampling { each: 4, in_cell });
+            let sampler = PixelSampler::new(&surface, &camera, Sampling { each: 4, in_cell, at_lamps: in_cell });
             for row in 0..9 {
                 let samples = sampler.row(row, 0..9);
                 for (column, samples) in samples.pixels().enumerate() {
@@ -273,12 +289,12 @@ mod tests {
         let surface = VisibleSurface::new(&scene);
         let eye = DVec3::new(0.5, 0.5, 0.1);
         let camera = Camera::new(eye, eye + DVec3::Z, DVec3::Y, Lens::Vertical(50.0), [8, 8]).unwrap();
-        let sampler = PixelSampler::new(&surface, &camera, Sampling { each: 2, in_cell: 4 });
+        let sampler = PixelSampler::new(&surface, &camera, Sampling { each: 2, in_cell: 4, at_lamps: 4 });
         assert_eq!((0..8).map(|row| sampler.row(row, 0..8).borders).sum::<usize>(), 0);
         // The far wall has an angle of 58.1 degrees there, so that a view of 70 sees its border all around.
         let camera =
             Camera { ..Camera::new(eye, eye + DVec3::Z, DVec3::Y, Lens::Vertical(70.0), [8, 8]).unwrap() };
-        let sampler = PixelSampler::new(&surface, &camera, Sampling { each: 2, in_cell: 4 });
+        let sampler = PixelSampler::new(&surface, &camera, Sampling { each: 2, in_cell: 4, at_lamps: 4 });
         let borders: Vec<usize> = (0..8).map(|row| sampler.row(row, 0..8).borders).collect();
         assert!(borders.iter().all(|&count| count >= 2), "{borders:?}");
     }

@@ -295,7 +295,7 @@ mod tests {
 
     fn fine(samples: usize) -> Quality {
         Quality {
-            sampling: Sampling { each: samples, in_cell: 2 },
+            sampling: Sampling { each: samples, in_cell: 2, at_lamps: 2 },
             scheme: Some(Scheme::Linear),
             tolerance: 0.01,
             layers: Vec::new(),

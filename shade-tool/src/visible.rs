@@ -51,6 +51,8 @@ pub struct VisibleSurface {
     caster: RayCaster,
     piece_faces: Vec<FaceId>,
     two_sided: Vec<bool>,
+    /// Whether each face emits.
+    emitting: Vec<bool>,
     elements: FaceElements,
     /// Number of each face's surface.
     surfaces: Vec<u32>,
@@ -85,7 +87,11 @@ fn surfaces(mesh: &Mesh) -> Vec<u32> {
 impl VisibleSurface {
     /// Rays meet the faces' convex pieces, not the elements, which are many more.
     pub fn new(scene: &LitScene) -> VisibleSurface {
-        VisibleSurface::of_mesh(&scene.mesh)
+        let mut surface = VisibleSurface::of_mesh(&scene.mesh);
+        for element in scene.mesh.element_ids().filter(|&element| scene.material(element).emits()) {
+            surface.emitting[scene.mesh.element_face(element).index()] = true;
+        }
+        surface
     }
 
     /// As [`VisibleSurface::new`], for a mesh without light.
@@ -95,9 +101,15 @@ impl VisibleSurface {
             caster: RayCaster::new(&pieces),
             piece_faces: mesh.occluder_faces.clone(),
             two_sided: (0..mesh.face_count()).map(|face| mesh.is_two_sided(FaceId::new(face))).collect(),
+            emitting: vec![false; mesh.face_count()],
             elements: FaceElements::new(mesh),
             surfaces: surfaces(mesh),
         }
+    }
+
+    /// Whether it is a face that emits.
+    pub fn emits(&self, met: &Met) -> bool {
+        matches!(met, Met::Face(point) if self.emitting[point.face.index()])
     }
 
     /// What the ray through the place `x`, `y` of the picture meets, in pixels.

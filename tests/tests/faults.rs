@@ -381,7 +381,7 @@ fn a_read_only_folder_keeps_the_old_file_and_is_named() {
         let output = disk.path("s").with_extension(stage.output());
         std::fs::write(&output, "old").unwrap();
         if disk.protect() {
-            assert_kept(stage, &output, "ead-only file system");
+            assert_kept(stage, &output, "mount this one for writing");
             tested += 1;
         }
     }
