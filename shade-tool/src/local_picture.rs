@@ -192,7 +192,13 @@ mod tests {
         let mut report = Report::new("shade-tool", "test");
         let common = Common { threads: None, quiet: true, verbose: false };
         let renderer = LocalRenderer::new(scene, model, &mut report);
-        let picture = renderer.render(camera, Sampling { each: 2, in_cell: 2, at_lamps: 2 }, layers, &common, &mut report);
+        let picture = renderer.render(
+            camera,
+            Sampling { each: 2, in_cell: 2, at_lamps: 2 },
+            layers,
+            &common,
+            &mut report,
+        );
         (picture, report)
     }
 

@@ -40,7 +40,8 @@ impl Sampling {
         let in_cell = per_cell(side);
         // Whoever asks for no more samples at borders than elsewhere gets no more.
         let is_off = at_borders.is_some() && in_cell == 1;
-        let at_lamps = if is_off { 1 } else { per_cell((TIMES_AT_LAMPS * side).min(MOST_AT_LAMPS)).max(in_cell) };
+        let at_lamps =
+            if is_off { 1 } else { per_cell((TIMES_AT_LAMPS * side).min(MOST_AT_LAMPS)).max(in_cell) };
         Sampling { each, in_cell, at_lamps }
     }
 }
@@ -256,7 +257,8 @@ mod tests {
         let camera = Camera::new(eye, DVec3::ZERO, DVec3::Y, Lens::Orthographic(9.0), [9, 9]).unwrap();
         let mut largest = [0.0f64; 2];
         for (in_cell, largest) in [1, 4].into_iter().zip(&mut largest) {
-            let sampler = PixelSampler::new(&surface, &camera, Sampling { each: 4, in_cell, at_lamps: in_cell });
+            let sampler =
+                PixelSampler::new(&surface, &camera, Sampling { each: 4, in_cell, at_lamps: in_cell });
             for row in 0..9 {
                 let samples = sampler.row(row, 0..9);
                 for (column, samples) in samples.pixels().enumerate() {
