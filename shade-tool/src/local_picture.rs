@@ -86,7 +86,7 @@ impl<'a> LocalRenderer<'a> {
         let [width, height] = camera.size.map(|n| n as usize);
         let bar = common.progress("render", height);
         let sampler = PixelSampler::new(&self.surface, camera, sampling);
-        let rows: Vec<(Vec<Pixel>, usize, usize)> = report.phase("shading", || {
+        let rows: Vec<(Vec<Pixel>, usize, [usize; 2])> = report.phase("shading", || {
             (0..height)
                 .into_par_iter()
                 .map_init(Scratch::default, |scratch, row| {
@@ -94,12 +94,13 @@ impl<'a> LocalRenderer<'a> {
                     let samples = sampler.row(row, 0..width);
                     let pixels =
                         samples.pixels().map(|samples| self.pixel(camera, samples, scratch)).collect();
-                    (pixels, samples.rays, samples.borders)
+                    (pixels, samples.rays, [samples.borders, samples.lamp_borders])
                 })
                 .collect()
         });
         report.count("samples", rows.iter().map(|row| row.1).sum());
-        report.count("border_pixels", rows.iter().map(|row| row.2).sum());
+        report.count("border_pixels", rows.iter().map(|row| row.2[0]).sum());
+        report.count("lamp_border_pixels", rows.iter().map(|row| row.2[1]).sum());
         let pixels: Vec<Pixel> = rows.into_iter().flat_map(|row| row.0).collect();
         bar.finish_and_clear();
         let mut layers = layers.to_vec();

@@ -65,6 +65,8 @@ pub struct RowSamples {
     ends: Vec<usize>,
     /// Pixels that borders of surfaces cross.
     pub borders: usize,
+    /// Those of them that a lamp is seen in.
+    pub lamp_borders: usize,
     /// Rays cast.
     pub rays: usize,
 }
@@ -161,7 +163,9 @@ impl<'a> PixelSampler<'a> {
         row.rays += met.len();
         let all = || met.iter().map(|(met, _)| met).chain(corners.as_flattened());
         let is_border = all().any(|other| !self.surface.is_one_surface(&met[0].0, other));
-        let in_cell = if all().any(|met| self.surface.emits(met)) { at_lamps } else { in_cell };
+        let is_lamp = is_border && all().any(|met| self.surface.emits(met));
+        let in_cell = if is_lamp { at_lamps } else { in_cell };
+        row.lamp_borders += usize::from(is_lamp);
         row.borders += usize::from(is_border);
         let share = 1.0 / (each * each) as f64;
         if !is_border || in_cell == 1 {

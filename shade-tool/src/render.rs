@@ -154,7 +154,7 @@ impl<'a> Renderer<'a> {
         };
         let start = Instant::now();
         let bar = common.progress("interpolation", height);
-        let (mut rays, mut borders, mut background, mut back) = (0, 0, 0.0, 0.0);
+        let (mut rays, mut borders, mut lamps, mut background, mut back) = (0, 0, 0, 0.0, 0.0);
         for band in &bands {
             let rows = kept.take().unwrap_or_else(|| look(band, &ProgressBar::hidden()));
             let pixels: Vec<Vec<Pixel>> = rows
@@ -169,6 +169,7 @@ impl<'a> Renderer<'a> {
             append_layers(&mut picture.layers, &layers, &pixels);
             for row in &rows {
                 (rays, borders) = (rays + row.rays, borders + row.borders);
+                lamps += row.lamp_borders;
                 for sample in row.pixels().flatten() {
                     background += if sample.seen == Seen::Background { sample.share } else { 0.0 };
                     back += if sample.seen == Seen::Back { sample.share } else { 0.0 };
@@ -179,6 +180,7 @@ impl<'a> Renderer<'a> {
         bar.finish_and_clear();
         report.count("samples", rays);
         report.count("border_pixels", borders);
+        report.count("lamp_border_pixels", lamps);
         report.count("background_pixels", background.round() as usize);
         report.count("back_face_pixels", back.round() as usize);
         report.count("samples_gathered", gathered.load(Ordering::Relaxed) as usize);

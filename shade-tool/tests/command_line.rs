@@ -51,10 +51,13 @@ fn render_writes_picture_preview_and_report() {
 
     let report = std::fs::read_to_string(folder.path().join("s.exr.report.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
-    // Four in a pixel, two at each end of a column in a row; 20 x 20 where a border of walls is seen, by the tolerance of 0.02.
+    // Four in a pixel, two at each end of a column in a row; 20 x 20 where a border of walls is seen, by the tolerance of 0.02, and
+    // 58 x 58 where a lamp is on one side.
     let borders = report["counters"]["border_pixels"].as_u64().unwrap();
-    assert!(borders > 0);
-    assert_eq!(report["counters"]["samples"], 24 * 16 * 4 + 25 * 2 * 16 + borders * 20 * 20);
+    let lamps = report["counters"]["lamp_border_pixels"].as_u64().unwrap();
+    assert!(borders > lamps && lamps > 0);
+    let more = (borders - lamps) * 20 * 20 + lamps * 58 * 58;
+    assert_eq!(report["counters"]["samples"], 24 * 16 * 4 + 25 * 2 * 16 + more);
     // The ceiling is black, and the wall behind the eye is not seen.
     assert_eq!(report["counters"]["nodes_black_skipped"], 4);
     assert_eq!(report["counters"]["nodes_unseen_skipped"], 4);
