@@ -126,7 +126,7 @@ pub fn sized(
 fn warn_of_more(found: f64, asked: f64, report: &mut Report) {
     if found > MANY_MORE * asked {
         report.warn(format!(
-            "the faces and lines need about {found} elements, more than the {asked} asked for"
+            "faces, lines and their light take {found} elements, more than the {asked} asked for"
         ));
     }
 }
