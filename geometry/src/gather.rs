@@ -48,8 +48,22 @@ pub(crate) trait Taker {
     }
     /// Such a node, and what is seen of its polygon.
     fn take_node(&mut self, _node: usize, _seen: &Polygons, _look: Look) {}
+    /// The middle of a flat node, or of an element, from the point, where all of it gives so little that its middle tells
+    /// whether it is seen.
+    fn faint(&mut self, _part: Part, _look: Look) -> Option<DVec3> {
+        None
+    }
+    /// Such a part, whose middle is seen.
+    fn take_faint(&mut self, _part: Part, _look: Look) {}
     /// A cluster proved to be wholly behind one body.
     fn hidden(&mut self) {}
+}
+
+/// A part of a tree.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Part {
+    Node(usize),
+    Element(usize),
 }
 
 /// Where everything is looked at from.
@@ -130,6 +144,10 @@ impl Gatherer {
             return;
         }
 
+        if is_faint(Part::Node(index), &list, look, scratch, taker) {
+            return;
+        }
+
         // Pass on the shadows that may touch this cluster; one may take all of it.
         let start = scratch.candidates.len();
         let cone = Cone::around(bounds.centre, bounds.radius);
@@ -199,8 +217,20 @@ impl Gatherer {
         if list.is_empty() && low >= 0.0 && taker.takes_element(k, look) {
             return;
         }
-        taker.take(k, see(corners, list, look, scratch), look);
+        if !is_faint(Part::Element(k), &list, look, scratch, taker) {
+            taker.take(k, see(corners, list, look, scratch), look);
+        }
     }
+}
+
+/// Whether the taker has had a part by its middle, seen or not past the candidates of the list.
+fn is_faint(part: Part, list: &Range<usize>, look: Look, scratch: &Scratch, taker: &mut impl Taker) -> bool {
+    let Some(middle) = taker.faint(part, look) else { return false };
+    let candidates = &scratch.candidates[list.clone()];
+    if !candidates.iter().any(|&candidate| scratch.shadows.hides(candidate, middle)) {
+        taker.take_faint(part, look);
+    }
+    true
 }
 
 /// What is seen of a polygon: above the horizon, past the candidates of the list, from the point as origin.

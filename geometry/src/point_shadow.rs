@@ -205,6 +205,15 @@ impl PointShadows {
         if all_inside { Meets::Everything } else { Meets::Part(Candidate { across, ..candidate }) }
     }
 
+    /// Whether the shadow of a candidate holds a place, given from the point. A place on a front face lies before it.
+    pub fn hides(&self, candidate: Candidate, place: DVec3) -> bool {
+        let tolerance = PLANARITY * (self.shadows[candidate.shadow as usize].radius + place.length());
+        self.asked(candidate).all(|(_, space)| {
+            let rounding = if space.offset < 0.0 { tolerance * space.normal.length() } else { 0.0 };
+            space.normal.dot(place) + space.offset > rounding
+        })
+    }
+
     /// Writes the half-spaces of a candidate whose borders may cross its cluster.
     pub fn half_spaces(&self, candidate: Candidate, out: &mut Vec<HalfSpace>) {
         out.clear();

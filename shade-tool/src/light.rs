@@ -112,8 +112,8 @@ pub struct Gathering<const N: usize> {
     tree: SourceTree<N>,
     opening: Opening,
     points: AtomicU64,
-    /// Elements by exact factors, clusters by moments, clusters by fitted polygons, clusters hidden, in this order.
-    tally: [AtomicU64; 4],
+    /// Elements by exact factors, clusters by moments, clusters by fitted polygons, clusters hidden, faint clusters, in this order.
+    tally: [AtomicU64; 5],
     /// Sources.
     sources: usize,
 }
@@ -144,7 +144,8 @@ impl<const N: usize> Gathering<N> {
     pub fn irradiance(&self, receiver: &Receiver, scratch: &mut Scratch) -> [f64; N] {
         let (sum, counts) = self.tree.gather(receiver.point, receiver.normal, self.opening, scratch);
         self.points.fetch_add(1, Ordering::Relaxed);
-        for (tally, count) in self.tally.iter().zip([counts.exact, counts.far, counts.fitted, counts.hidden])
+        for (tally, count) in
+            self.tally.iter().zip([counts.exact, counts.far, counts.fitted, counts.hidden, counts.faint])
         {
             tally.fetch_add(count, Ordering::Relaxed);
         }
@@ -155,7 +156,7 @@ impl<const N: usize> Gathering<N> {
     pub fn count(&self, prefix: &str, report: &mut Report) {
         report.count(&format!("{prefix}joined"), self.sources);
         report.count(&format!("{prefix}points"), self.points.load(Ordering::Relaxed) as usize);
-        for (name, sum) in ["exact", "far", "fitted", "hidden_skipped"].iter().zip(&self.tally) {
+        for (name, sum) in ["exact", "far", "fitted", "hidden_skipped", "faint"].iter().zip(&self.tally) {
             report.count(&format!("{prefix}{name}"), sum.load(Ordering::Relaxed) as usize);
         }
     }

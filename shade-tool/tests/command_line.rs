@@ -343,7 +343,8 @@ fn layers_are_stored_by_name_and_skips_do_not_change_the_answer() {
     for flags in [
         "--no-skip far",
         "--no-skip hidden",
-        "--no-skip far,hidden,joined",
+        "--no-skip far,hidden,joined,faint",
+        "--no-skip faint",
         "--no-skip joined",
         "--interpolation gather",
     ] {
