@@ -8,15 +8,15 @@ use crate::convex::pieces_of_polygon;
 use crate::discontinuity::{self, DrawnLine, Order};
 use crate::frame::Frame;
 use crate::given::as_given;
-use crate::grading::grade;
+use crate::grading::{grade, grade_within};
 use crate::light::Light;
 use crate::meshed::{Drawing, Drawn, Triangles};
 use crate::patch::Patch;
 use crate::quality::measure;
 use crate::regions::{LostEmitter, merged};
-use crate::search::area;
+use crate::search::{area, count};
 use crate::sheets::{Layer, layers};
-use crate::sized::{graded, sized};
+use crate::sized::{REFINED_TOLERANCE, graded, shortest, sized};
 use crate::solids::Solids;
 use crate::solved::{self, Solved};
 use crate::steps::{Off, Skip, Step};
@@ -189,8 +189,12 @@ pub fn build(scene: &Scene, options: &Options, report: &mut Report) -> Result<Me
                 }
             }
             let meets = off.leaves(Step::Meet).then_some(&cleaned.places);
-            let shortest = graded(options, area(&drawings));
-            grade(&drawings, &mut meshes, shortest, meets).map_err(fail)?;
+            grade(&drawings, &mut meshes, graded(options, area(&drawings)), meets).map_err(fail)?;
+            if let Some(wanted) = options.elements.filter(|_| options.no_skip.leaves(Skip::Grading)) {
+                let shortest = shortest(area(&drawings), f64::from(wanted));
+                let most = (1.0 + REFINED_TOLERANCE) * count(&meshes) as f64;
+                grade_within(&drawings, &mut meshes, shortest, meets, most).map_err(fail)?;
+            }
             report.count("elements kept", kept(&base, &meshes));
         }
         patches = made(&meshes);

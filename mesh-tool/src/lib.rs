@@ -14,7 +14,8 @@
 //! one to other programs.
 //!
 //! # Limitations
-//! With a number of elements as budget, shape and grading yield to it: faces much narrower than the elements get narrow ones. Two
+//! With a number of elements as budget, shape and grading yield to it: faces much narrower than the elements get narrow ones, and sizes are
+//! graded only where that takes no more than a tenth above the number (`--no-skip grading`: always). Two
 //! curvature lines may cross at a degree or less; angles between them are what they are. A body that touches itself or
 //! has a hole is not closed, and what lies in it counts as lit.
 

@@ -38,6 +38,11 @@ impl Triangles {
         self.winners.iter().flatten().count()
     }
 
+    /// Triangles more than twice as large as a neighbour.
+    pub fn uneven(&self) -> usize {
+        self.refinement.uneven(&self.triangulation)
+    }
+
     /// Sheet that holds a triangle.
     pub fn sheet(&self, triangle: usize) -> Option<u32> {
         self.winners[triangle]

@@ -1,6 +1,6 @@
 //! The search for the spacing of triangles that gives the asked number of elements.
 
-use crate::grading::grade;
+use crate::grading::{grade, grade_within};
 use crate::meshed::{Drawing, Triangles};
 use crate::places::Places;
 use crate::triangulation::Trouble;
@@ -97,6 +97,12 @@ impl<Name: Fn(u32, Trouble) -> Error + Sync> Search<'_, Name> {
     /// Grades sizes and makes planes meet; returns how many could not.
     pub fn settle(&self, meshes: &mut [Triangles]) -> Result<usize> {
         grade(self.drawings, meshes, self.graded, self.meets)
+            .map_err(|(layer, trouble)| (self.name)(self.drawings[layer].layer().sheets[0].face, trouble))
+    }
+
+    /// Grades sizes, if that leaves no more than `most` triangles; says whether all are graded.
+    pub fn even_out(&self, meshes: &mut Vec<Triangles>, shortest: f64, most: f64) -> Result<bool> {
+        grade_within(self.drawings, meshes, shortest, self.meets, most)
             .map_err(|(layer, trouble)| (self.name)(self.drawings[layer].layer().sheets[0].face, trouble))
     }
 

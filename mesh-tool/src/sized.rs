@@ -17,7 +17,7 @@ use interchange::scene::Scene;
 use interchange::{Error, Result};
 
 /// The number of elements may miss what was asked for by this part, where they are refined for light.
-const REFINED_TOLERANCE: f64 = 0.1;
+pub const REFINED_TOLERANCE: f64 = 0.1;
 
 /// The number may be above what was asked for by this factor without a warning.
 const MANY_MORE: f64 = 1.15;
@@ -41,15 +41,20 @@ const SPARE: f64 = 1.25;
 pub const UNIFORM: f64 = 0.35;
 
 /// The length below which no edge is halved for the sake of even sizes, where the elements cover this area: light or shape
-/// would not either. `None` where a number of elements is asked for: even sizes would take several times that number in strips
-/// between lines or borders (BENCHMARKING.md).
+/// would not either. `None` where a number of elements is asked for: even sizes may take several times that number in strips
+/// between lines or borders (BENCHMARKING.md), and are made in the end, where the number allows it.
 pub fn graded(options: &Options, area: f64) -> Option<f64> {
     match (options.elements, options.max_edge) {
         (Some(_), _) if options.no_skip.leaves(Skip::Grading) => None,
-        (Some(wanted), _) => Some(lit::SHORTEST * spacing(area, f64::from(wanted))),
+        (Some(wanted), _) => Some(shortest(area, f64::from(wanted))),
         (None, Some(length)) => Some(FINE_FLOOR * SPACING_PER_MAX_EDGE * length),
         (None, None) => Some(adaptive::SHORTEST * area.sqrt()),
     }
+}
+
+/// The same for so many elements.
+pub fn shortest(area: f64, wanted: f64) -> f64 {
+    FINE_FLOOR * spacing(area, wanted)
 }
 
 /// Meshes all layers as the options ask: with `light`, smaller where it changes.
@@ -109,17 +114,36 @@ pub fn sized(
             if found < (1.0 - REFINED_TOLERANCE) * wanted {
                 break;
             }
-            if found <= (1.0 + REFINED_TOLERANCE) * wanted {
-                warn_of_more(found, asked, report);
+            let most = (1.0 + REFINED_TOLERANCE) * wanted;
+            if found <= most {
+                even_out(&search, &mut meshes, wanted, most, options, report)?;
+                warn_of_more(count(&meshes) as f64, asked, report);
                 return Ok(meshes);
             }
             // Edges that meet those of other planes took more than there was: leave room for them.
             aim *= wanted / found;
         }
     }
-    let meshes = search.counted(wanted)?.0;
+    let mut meshes = search.counted(wanted)?.0;
+    even_out(&search, &mut meshes, wanted, (1.0 + REFINED_TOLERANCE) * wanted, options, report)?;
     warn_of_more(count(&meshes) as f64, wanted, report);
     Ok(meshes)
+}
+
+/// Grades sizes where that takes no more than `most` elements.
+fn even_out<Name: Fn(u32, Trouble) -> Error + Sync>(
+    search: &Search<'_, Name>,
+    meshes: &mut Vec<Triangles>,
+    wanted: f64,
+    most: f64,
+    options: &Options,
+    report: &mut Report,
+) -> Result<()> {
+    if options.no_skip.leaves(Skip::Grading) {
+        let done = search.even_out(meshes, shortest(search.area(), wanted), most)?;
+        report.count("skipped: even sizes, which take more than the number of elements", usize::from(!done));
+    }
+    Ok(())
 }
 
 /// Says that there are more elements than asked for, where there are many more.

@@ -42,7 +42,7 @@ pub enum Skip {
     Budget,
     /// Lines that pass each other or a border more closely than elements can follow are led through what is there
     Near,
-    /// With a number of elements as budget, neighbours in strips between lines or borders may differ in size by any factor
+    /// Neighbours may differ in size by more than a factor two where a number of elements is asked for and that would take more
     Grading,
 }
 

@@ -105,7 +105,7 @@ pub struct RenderArguments {
     /// Picture to write
     #[arg(short, long, value_name = "S.EXR", value_parser = ends_in("exr"))]
     pub output: PathBuf,
-    /// Tone-mapped preview to write besides
+    /// Tone-mapped preview to write besides; where a lamp covers a part of a pixel, lamp and surroundings are toned before their mean
     #[arg(long, value_name = "S.PNG", value_parser = ends_in("png"))]
     pub png: Option<PathBuf>,
     /// Camera of a scene's toml; without one the picture frames the scene from outside

@@ -71,6 +71,7 @@ impl StoredPicture {
             pixels,
             layers: layers.collect(),
             bounces: (0..).map_while(bounce).collect(),
+            lamps: Vec::new(),
         };
         let told = layer.attributes.other.iter().find(|(name, _)| name.as_slice() == PROVENANCE.as_bytes());
         let told: Value = match told {
@@ -201,6 +202,7 @@ mod tests {
             pixels: vec![[1.0, 0.5, 0.25], [0.0, 4.0, 8.0]],
             layers,
             bounces: vec![vec![[0.5; 3]; 2], vec![[0.25; 3]; 2]],
+            lamps: Vec::new(),
         };
         let camera = Camera::new(DVec3::ZERO, DVec3::Z, DVec3::Y, Lens::Vertical(90.0), [2, 1]).unwrap();
         let provenance = Provenance::new("shade-tool", "9")

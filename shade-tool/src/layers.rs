@@ -93,6 +93,10 @@ pub struct Pixel {
     pub indirect: [f64; 3],
     /// Mean estimated error of radiance.
     pub error: f64,
+    /// Part of the pixel where a lamp is seen.
+    pub lamp_share: f64,
+    /// What that part adds to the radiance.
+    pub lamp_radiance: [f64; 3],
 }
 
 impl Layer {

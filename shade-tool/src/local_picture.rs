@@ -106,13 +106,9 @@ impl<'a> LocalRenderer<'a> {
         let mut layers = layers.to_vec();
         layers.sort_unstable();
         layers.dedup();
-        let picture = Picture {
-            width,
-            height,
-            pixels: pixels.iter().map(|pixel| pixel.radiance).collect(),
-            layers: layers.into_iter().map(|layer| (layer, layer.of(&pixels))).collect(),
-            bounces: Vec::new(),
-        };
+        let layers = layers.into_iter().map(|layer| (layer, layer.of(&pixels))).collect();
+        let mut picture = Picture { width, height, layers, ..Picture::default() };
+        picture.append(&pixels);
         for (channel, mean) in ["r", "g", "b"].iter().zip(picture.mean()) {
             report.estimate(&format!("mean_radiance_{channel}"), mean);
         }
@@ -133,6 +129,10 @@ impl<'a> LocalRenderer<'a> {
             let point = plane.project(origin + depth * direction);
             let (radiance, irradiance) = self.shade(element, &plane, point, -direction, scratch);
             add(&mut pixel.radiance, radiance);
+            if self.scene.material(element).emits() {
+                pixel.lamp_share += sample.share;
+                add(&mut pixel.lamp_radiance, radiance);
+            }
             add(&mut pixel.irradiance, irradiance);
             add(&mut pixel.albedo, self.scene.material(element).diffuse);
             add(&mut pixel.normal, plane.normal.to_array());

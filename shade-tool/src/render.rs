@@ -165,7 +165,7 @@ impl<'a> Renderer<'a> {
                 })
                 .collect();
             let pixels = pixels.concat();
-            picture.pixels.extend(pixels.iter().map(|pixel| pixel.radiance));
+            picture.append(&pixels);
             append_layers(&mut picture.layers, &layers, &pixels);
             for row in &rows {
                 (rays, borders) = (rays + row.rays, borders + row.borders);
@@ -236,6 +236,10 @@ impl Looks<'_> {
                 None => self.scene.radiosity[source as usize],
             };
             add(&mut pixel.radiance, radiosity, radiance);
+            if material.emits() {
+                pixel.lamp_share += share;
+                add(&mut pixel.lamp_radiance, radiosity, radiance);
+            }
             add(&mut pixel.albedo, rho, share);
             add(&mut pixel.irradiance, irradiance, share);
             add(&mut pixel.direct, std::array::from_fn(|c| exitance[c] + rho[c] * parts[c]), radiance);
@@ -288,6 +292,7 @@ mod tests {
     use super::*;
     use crate::camera::{Camera, Lens};
     use crate::test_scenes::{add_parallelogram, cube, empty_mesh, lit};
+    use crate::tone::{Curve, Exposure, Tone};
     use glam::DVec3;
     use interchange::mesh::FACE_TWO_SIDED;
 
@@ -430,6 +435,42 @@ mod tests {
             // The wall z = 1 has the last four of the 24 elements.
             assert!(elements.iter().all(|&element| (20..24).contains(&element)), "{elements:?}");
             assert_eq!(picture.layer(Layer::Face), Some(&Values::Indices(vec![5; 81])));
+        }
+    }
+
+    /// A square lamp, turned, in the dark: its part of each pixel is what the pixel has of its radiance, and what the preview shows.
+    #[test]
+    fn lamps_borders_are_as_bright_in_the_preview_as_they_are_covered() {
+        let (sin, cos) = 0.37f64.sin_cos();
+        let (along, across) = (DVec3::new(cos, sin, 0.0), DVec3::new(-sin, cos, 0.0));
+        let mut mesh = empty_mesh();
+        add_parallelogram(&mut mesh, -2.0 * (along + across), 4.0 * along, 4.0 * across, 1, 0);
+        let mut scene = lit(mesh);
+        scene.materials[0].diffuse = [0.0; 3];
+        scene.materials[0].radiance = [20.0; 3];
+        let eye = DVec3::new(0.0, 0.0, 5.0);
+        let camera = Camera::new(eye, DVec3::ZERO, DVec3::Y, Lens::Orthographic(9.0), [9, 9]).unwrap();
+        let mut report = report();
+        let picture = rendered(&scene, &camera, &fine(4), &mut report);
+        let between = |p: &&[f64; 3]| p[0] > 0.0 && p[0] < 20.0 - 1e-6;
+        assert_eq!(picture.lamps.len(), picture.pixels.iter().filter(between).count());
+        let (count, borders) = (picture.lamps.len(), report.counters["lamp_border_pixels"]);
+        // Twelve pixels are covered by a quarter to five sixths, eight by a hundredth, which samples may miss.
+        assert!((12..=20).contains(&count) && count as u64 <= borders, "{count} of {borders}");
+        let shown = |curve| Tone::new(&picture, Exposure::Stops(0.0), curve).shown(&picture).pixels;
+        let (linear, white) = (shown(Curve::Linear), shown(Curve::Reinhard));
+        for lamp in &picture.lamps {
+            // The shares are sums of at most 64 parts of 1.
+            let pixel = picture.pixels[lamp.pixel];
+            assert!((pixel[0] - 20.0 * lamp.share).abs() < 1e-12, "{pixel:?} {lamp:?}");
+            assert_eq!(pixel, lamp.radiance);
+            // IEC 61966-2-1 for the covered part of white; a share below 0.0031 would be on its straight part.
+            let want = 255.0 * (1.055 * lamp.share.powf(1.0 / 2.4) - 0.055);
+            assert!(
+                lamp.share > 0.0032 && (f64::from(linear[lamp.pixel][0]) - want).abs() < 0.501,
+                "{lamp:?}"
+            );
+            assert_eq!(linear[lamp.pixel], white[lamp.pixel]);
         }
     }
 

@@ -10,9 +10,13 @@
 //! - `filmic`: with a toe and a shoulder, the rational fit of Narkowicz 2015 to the film curve of the Academy Color Encoding
 //!   System, scaled so that middle grey stays middle grey: more contrast, deeper shadows.
 //! - `linear`: radiance as it is, cut at white. Twice the light is twice the value, for comparing.
+//!
+//! A pixel that a lamp covers in part shows the mean of lamp and surroundings as each appears on the screen, weighted by what each covers: a lamp is
+//! many times brighter than white, and the mean of radiance would be white from a few percent of lamp on, its border stepped. That
+//! needs [`Picture::lamps`], which a rendered picture has and a stored one does not: views of a file show mean radiance.
 
 use crate::canvas::Canvas;
-use crate::picture::{Picture, luminance};
+use crate::picture::{LampPart, Picture, luminance};
 use std::str::FromStr;
 
 /// Where the logarithmic mean goes: middle grey.
@@ -131,16 +135,37 @@ impl Tone {
 
     /// A radiance as it appears on a screen.
     pub fn displayed(&self, radiance: [f64; 3]) -> [u8; 3] {
+        encoded(self.light(radiance))
+    }
+
+    /// Light of a screen for a radiance, 0 black and 1 white.
+    fn light(&self, radiance: [f64; 3]) -> [f64; 3] {
         radiance.map(|x| match self.factor * x {
-            x if x.is_finite() => (255.0 * srgb(self.curve.value(x, self.white).clamp(0.0, 1.0)) + 0.5) as u8,
-            x if x > 0.0 => 255,
-            _ => 0,
+            x if x.is_finite() => self.curve.value(x, self.white).clamp(0.0, 1.0),
+            x if x > 0.0 => 1.0,
+            _ => 0.0,
         })
+    }
+
+    /// A pixel with lamps in it as it appears on a screen: what is lamp and what is not, each by itself.
+    fn displayed_apart(&self, whole: [f64; 3], lamp: &LampPart) -> [u8; 3] {
+        let other = 1.0 - lamp.share;
+        let at_lamp = self.light(lamp.radiance.map(|x| x / lamp.share));
+        // Rounding may leave a little less than nothing.
+        let beside: [f64; 3] = std::array::from_fn(|c| ((whole[c] - lamp.radiance[c]) / other).max(0.0));
+        let beside = self.light(beside);
+        encoded(std::array::from_fn(|c| lamp.share * at_lamp[c] + other * beside[c]))
     }
 
     /// A picture as it appears on a screen.
     pub fn shown(&self, picture: &Picture) -> Canvas {
-        let pixels = picture.pixels.iter().map(|&pixel| self.displayed(pixel)).collect();
+        let mut pixels: Vec<[u8; 3]> = picture.pixels.iter().map(|&pixel| self.displayed(pixel)).collect();
+        for lamp in &picture.lamps {
+            if let (Some(shown), Some(&whole)) = (pixels.get_mut(lamp.pixel), picture.pixels.get(lamp.pixel))
+            {
+                *shown = self.displayed_apart(whole, lamp);
+            }
+        }
         Canvas { width: picture.width, height: picture.height, pixels }
     }
 }
@@ -156,6 +181,11 @@ pub fn automatic_factor(parts: impl Iterator<Item = (f64, f64)>) -> Option<f64> 
     let mean = mean_of(&lit, |l| l);
     lit.retain(|&(l, _)| l > TOO_DARK * mean);
     (!lit.is_empty()).then(|| KEY / mean_of(&lit, f64::ln).exp())
+}
+
+/// Light of a screen to 8 bits.
+fn encoded(light: [f64; 3]) -> [u8; 3] {
+    light.map(|x| (255.0 * srgb(x) + 0.5) as u8)
 }
 
 /// Encoding of IEC 61966-2-1.
@@ -250,6 +280,23 @@ mod tests {
         let [dark, bright] = shown(&picture, "0", Curve::Filmic)[..] else { unreachable!() };
         let [dark_before, bright_before] = shown(&picture, "0", Curve::Reinhard)[..] else { unreachable!() };
         assert!(dark[0] < dark_before[0] && bright[0] - dark[0] > bright_before[0] - dark_before[0]);
+    }
+
+    /// A quarter of the pixel is lamp, twenty times brighter than white, the rest a wall at 0.1. The mean of radiance is white; the mean of what
+    /// is shown is 0.25 + 0.75 * 0.1 = 0.325, in sRGB 0.6055, 154.4 of 255.
+    #[test]
+    fn partly_covered_by_a_lamp_is_between_lamp_and_wall() {
+        let mut picture = grey(&[0.1, 0.25 * 20.0 + 0.75 * 0.1, 20.0]);
+        assert_eq!(shown(&picture, "0", Curve::Linear), [[89; 3], [255; 3], [255; 3]]);
+        picture.lamps = vec![LampPart { pixel: 1, share: 0.25, radiance: [0.25 * 20.0; 3] }];
+        assert_eq!(shown(&picture, "0", Curve::Linear), [[89; 3], [154; 3], [255; 3]]);
+        // A lamp no brighter than the wall leaves the pixel as it is, on any curve.
+        let mut even = grey(&[0.1; 3]);
+        even.lamps = vec![LampPart { pixel: 1, share: 0.25, radiance: [0.025; 3] }];
+        for curve in CURVES {
+            let pixels = shown(&even, "0", curve);
+            assert_eq!(pixels[1], pixels[0], "{curve:?}");
+        }
     }
 
     #[test]

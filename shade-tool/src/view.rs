@@ -39,7 +39,7 @@ const MOST_CONTOURS: f64 = 1000.0;
   shade-tool view error s.exr -o error.png"
 )]
 pub enum View {
-    /// Tone-mapped, as the preview of render
+    /// Tone-mapped, as the preview of render but for the borders of lamps: a file has mean radiance only, which is stepped there
     Tone(ToneView),
     /// A quantity in colours, with a labelled scale
     FalseColour(FalseColourView),

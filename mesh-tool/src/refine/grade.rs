@@ -36,6 +36,17 @@ impl Refinement {
         Ok(graded)
     }
 
+    /// How many triangles are more than [`GRADING`] times as large as a neighbour: grading divides at least these.
+    pub fn uneven(&self, triangulation: &Triangulation) -> usize {
+        let lit = triangulation.triangles.iter().enumerate().filter(|(t, _)| triangulation.is_lit(*t));
+        lit.filter(|(_, triangle)| self.too_large(triangulation, triangle, &self.shape(triangle))).count()
+    }
+
+    /// Whether a triangle is more than [`GRADING`] times as large as a neighbour.
+    fn too_large(&self, triangulation: &Triangulation, triangle: &Triangle, shape: &Shape) -> bool {
+        shape.longest > (1.0 + ROUNDING) * GRADING * self.smallest_neighbour(triangulation, triangle)
+    }
+
     /// The edges to be halved, each once.
     fn gradings(&self, triangulation: &Triangulation, shortest: f64) -> Vec<(Change, f64)> {
         let (mut seen, mut changes) = (BTreeSet::new(), Vec::new());
@@ -44,8 +55,7 @@ impl Refinement {
                 continue;
             }
             let shape = self.shape(triangle);
-            let most = (1.0 + ROUNDING) * GRADING * self.smallest_neighbour(triangulation, triangle);
-            if shape.longest <= most {
+            if !self.too_large(triangulation, triangle, &shape) {
                 continue;
             }
             let k = self.graded_edge(triangle, &shape);
