@@ -333,8 +333,8 @@ clean:
 
 # ---- Proof: time against error, stress, damage, skips ------------------------------------------------------------------
 
-# BENCHMARKS.md says what is measured. An interrupted bench goes on; BENCH_FLAGS="--scenes cornell_empty --minutes 3" does
-# a part, and `skips` without SCENE measures the reference scenes.
+# BENCHMARKS.md says what is measured. A bench takes 40 minutes at most and, interrupted or out of time, goes on when called again;
+# BENCH_FLAGS="--scenes cornell_empty --minutes 3" does a part, and `skips` without SCENE measures the reference scenes.
 BENCH_FLAGS ?=
 .PHONY: bench reference skips stress fuzz faults
 bench reference: $(built)

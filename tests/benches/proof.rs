@@ -20,7 +20,8 @@ struct Options {
     errors: Vec<f64>,
     budget: Duration,
     end: Instant,
-    reference_error: f64,
+    /// In place of each scene's own.
+    reference_error: Option<f64>,
     into: PathBuf,
     scene: Option<PathBuf>,
 }
@@ -51,7 +52,7 @@ impl Options {
             errors: list(take("errors", &all)).into_iter().map(number).collect(),
             budget: Duration::from_secs_f64(number(take("budget", "15"))),
             end: Instant::now() + Duration::from_secs_f64(60.0 * number(take("minutes", "40"))),
-            reference_error: number(take("reference-error", "0.001")),
+            reference_error: Some(take("reference-error", "")).filter(|e| !e.is_empty()).map(number),
             into: folder(take("into", "BENCHMARKS.md")),
             scene: Some(take("scene", "")).filter(|s| !s.is_empty()).map(folder),
         };
@@ -73,9 +74,10 @@ fn main() {
     }
 }
 
-/// A reference may take thirty times as long as a case.
+/// Each of a reference's two runs may take sixty times as long as a case.
 fn make_reference(options: &Options, scene: &str) -> Option<Reference> {
-    reference::make(scene, &options.work, options.reference_error, 30 * options.budget)
+    let error = options.reference_error.unwrap_or_else(|| plan::reference_error(scene));
+    reference::make(scene, &options.work, error, 60 * options.budget)
 }
 
 fn bench(options: &Options) {
@@ -83,25 +85,38 @@ fn bench(options: &Options) {
     let mut rows = record::read(&path);
     let (mut references, mut matrices) = (BTreeMap::new(), BTreeMap::new());
     let mut last: BTreeMap<_, (f64, f64)> = BTreeMap::new();
-    let mut asked = BTreeSet::new();
+    let (mut asked, mut late) = (BTreeSet::new(), Vec::new());
     for case in plan::cases(&options.scenes, &options.errors) {
-        if Instant::now() > options.end {
-            println!("the time is over: another call goes on from here");
-            break;
-        }
-        let (prefix, commands) = runner::case_commands(&case, &options.work, "run");
+        let (mut prefix, commands) = runner::case_commands(&case, &options.work, "run");
         let key = runner::key(&case, &commands, &options.work);
-        asked.insert(key.clone());
-        if let Some(known) = rows.iter().find(|row| row.key == key) {
-            last.insert(case.curve(), seconds(known, case.error, options.budget));
+        let budget = case.budget_s(options.budget.as_secs_f64());
+        if let Some(known) = rows.iter().find(|row| row.key == key && is_known(row, budget)) {
+            last.insert(case.curve(), seconds(known, case.error, budget));
+            asked.insert(key);
             continue;
         }
-        let foretold = last.get(&case.curve()).map_or(0.0, |&(s, e)| plan::foretold_s(s, e, case.error));
         let mut row = row_of(&case, &key);
-        if foretold > options.budget.as_secs_f64() {
-            row.state = format!("over budget (foretold {foretold:.0} s)");
+        if Instant::now() > options.end {
+            row.state = "the time was over; another call goes on from here".to_owned();
+            late.push(row);
+            continue;
+        }
+        asked.insert(key.clone());
+        let reference = match case.matrix_only() {
+            true => None,
+            false => references
+                .entry(case.scene.clone())
+                .or_insert_with(|| make_reference(options, &case.scene))
+                .as_ref(),
+        };
+        let foretold = last.get(&case.curve()).map_or(0.0, |&(s, e)| plan::foretold_s(s, e, case.error));
+        if let Some(done) = reference.filter(|_| case.by_default()).and_then(|r| r.run_at(case.error)) {
+            (row.state, row.costs, row.elements) = (done.state.clone(), done.costs, done.elements);
+            prefix.clone_from(&done.prefix);
+        } else if foretold > budget {
+            row.state = format!("{} (foretold {foretold:.0} s)", runner::over(budget));
         } else {
-            let done = runner::run_commands(&prefix, &commands, options.budget);
+            let done = runner::run_commands(&prefix, &commands, Duration::from_secs_f64(budget));
             (row.state, row.costs, row.elements) = (done.state, done.costs, done.elements);
         }
         if row.state == "done" && case.matrix_only() {
@@ -111,9 +126,7 @@ fn bench(options: &Options) {
                 .or_insert_with(|| reference::matrix(&case.scene, &options.work, matrix_tolerance(least)));
             [row.errors[3], row.errors[4]] = errors::rows(&prefix.with_extension("ff"), reference);
         } else if row.state == "done" {
-            let reference =
-                references.entry(case.scene.clone()).or_insert_with(|| make_reference(options, &case.scene));
-            compare(&mut row, &prefix, reference.as_ref());
+            compare(&mut row, &prefix, reference);
         }
         println!(
             "{} {}/{} {}: {} {:.2} CPU s, error {:.2e}",
@@ -125,18 +138,36 @@ fn bench(options: &Options) {
             row.cpu_s(),
             row.main_error()
         );
-        last.insert(case.curve(), seconds(&row, case.error, options.budget));
+        last.insert(case.curve(), seconds(&row, case.error, budget));
+        rows.retain(|old| old.key != row.key);
         rows.push(row);
         record::write(&path, &rows);
     }
-    // Rows of older programs or flags stay in the CSV, out of the tables.
-    let current: Vec<&Row> = rows.iter().filter(|row| asked.contains(&row.key)).collect();
+    if !late.is_empty() {
+        println!("the time is over: another call goes on with the {} cases left", late.len());
+    }
+    // Rows of older programs or flags stay in the CSV, out of the tables, which are in the order of errors, then methods.
+    let mut current: Vec<&Row> =
+        rows.iter().filter(|row| asked.contains(&row.key)).chain(late.iter()).collect();
+    current.sort_by_key(|row| {
+        (plan::METHODS.iter().position(|m| row.method == *m), row.mesh != "uniform", row.mesh != "adaptive")
+    });
+    current.sort_by(|a, b| b.asked.total_cmp(&a.asked));
     publish(options, &current, &references);
 }
 
 /// The row errors of the pipeline's matrices are some hundredths of the tolerance, which is half the asked error.
 fn matrix_tolerance(least_error: f64) -> f64 {
     (least_error / 2.0 / 100.0).max(1e-6)
+}
+
+/// Whether a row of an earlier call stands: measured, or not run for a reason that still holds. One without an error was
+/// made while there was no reference.
+fn is_known(row: &Row, budget_s: f64) -> bool {
+    match row.state.as_str() {
+        "done" => row.main_error().is_finite(),
+        state => state.starts_with("failed") || state.starts_with(&runner::over(budget_s)),
+    }
 }
 
 fn row_of(case: &Case, key: &str) -> Row {
@@ -153,10 +184,10 @@ fn row_of(case: &Case, key: &str) -> Row {
 }
 
 /// Seconds and error that the next case of the curve is foretold from.
-fn seconds(row: &Row, error: f64, budget: Duration) -> (f64, f64) {
+fn seconds(row: &Row, error: f64, budget_s: f64) -> (f64, f64) {
     let wall: f64 = row.costs.iter().map(|cost| cost.wall_s).sum();
     // What was stopped would have taken longer than the budget.
-    (if row.state == "done" { wall } else { 2.0 * budget.as_secs_f64() }, error)
+    (if row.state == "done" { wall } else { 2.0 * budget_s }, error)
 }
 
 fn compare(row: &mut Row, prefix: &Path, reference: Option<&Reference>) {
@@ -166,6 +197,11 @@ fn compare(row: &mut Row, prefix: &Path, reference: Option<&Reference>) {
     {
         row.errors[0] = errors::rms(&got, &reference.irradiance);
         row.errors[1] = errors::rms(&got, &errors::given(points));
+    }
+    // The reference says nothing about itself.
+    if prefix == reference.prefix {
+        row.errors[0] = f64::NAN;
+        return;
     }
     row.errors[2] = errors::picture(&prefix.with_extension("exr"), &reference.prefix.with_extension("exr"));
 }
@@ -180,9 +216,16 @@ fn note(scene: &str, reference: Option<&Reference>) -> String {
         }
         None => format!("{scene}: no reference within the budget."),
         Some(r) => format!(
-            "{scene}: the reference is {:.1e} (points) and {:.1e} (picture) from a run at twice its error; {:.1e} from \
-             the given answers. Errors that are less than ten times the first two are uncertain by them.",
-            r.own_error[0], r.own_error[1], r.given_error
+            "{scene}: the reference, made at {}, is {:.1e} (points) and {:.1e} (picture) from a run at twice that; {:.1e} from \
+             the given answers{}. Errors that are less than ten times the first two are uncertain by them.",
+            r.runs[0].0,
+            r.own_error[0],
+            r.own_error[1],
+            r.given_error,
+            match r.given_noise {
+                noise if noise.is_finite() => format!(", whose standard errors alone make {noise:.1e}"),
+                _ => String::new(),
+            }
         ),
     }
 }
@@ -191,10 +234,11 @@ fn publish(options: &Options, rows: &[&Row], references: &BTreeMap<String, Optio
     let pictures = options.into.with_file_name("docs").join("bench");
     std::fs::create_dir_all(&pictures).unwrap();
     let mut text = format!(
-        "Machine: {}. Budget of a run {:.0} s on the clock; compare ratios within this table only.\n\n",
+        "Machine: {}. Budget of a run {:.0} s on the clock, more in the room; compare ratios within this table only.\n\n",
         table::machine(),
         options.budget.as_secs_f64()
     );
+    let mut own_errors = BTreeMap::new();
     for scene in &options.scenes {
         let own: Vec<&Row> = rows.iter().copied().filter(|row| row.scene == *scene).collect();
         if own.is_empty() {
@@ -205,6 +249,9 @@ fn publish(options: &Options, rows: &[&Row], references: &BTreeMap<String, Optio
             .get(scene)
             .cloned()
             .unwrap_or_else(|| if scene.starts_with("box") { None } else { make_reference(options, scene) });
+        if let Some(reference) = &made {
+            own_errors.insert(scene.as_str(), reference.own_error);
+        }
         let picture = pictures.join(format!("{scene}.svg"));
         plot::draw(&picture, scene, &own).unwrap_or_else(|e| panic!("{}: {e}", picture.display()));
         text += &format!("### {scene}\n\n{}", table::scene(&own, &note(scene, made.as_ref())));
@@ -213,6 +260,8 @@ fn publish(options: &Options, rows: &[&Row], references: &BTreeMap<String, Optio
         }
     }
     table::put(&options.into, "bench", &text);
+    let achieved = table::achieved(rows, |scene| own_errors.get(scene).copied());
+    table::put(&options.into, "achieved", &format!("Machine: {}.\n\n{achieved}", table::machine()));
     println!("written: {}", options.into.display());
 }
 

@@ -47,6 +47,23 @@ pub fn given(points: &Table) -> Vec<[f64; 3]> {
     (0..points.rows.len()).map(|row| ["r", "g", "b"].map(|channel| trusted(row, channel))).collect()
 }
 
+/// RMS relative error that the standard errors of the given irradiances alone would make; NaN where the table has none, as exact
+/// answers do.
+pub fn given_noise(points: &Table) -> f64 {
+    let known = |channel: &str| points.header.iter().any(|h| *h == format!("seE_{channel}"));
+    if !["r", "g", "b"].into_iter().all(known) {
+        return f64::NAN;
+    }
+    let want = given(points);
+    let mut got = want.clone();
+    for (row, values) in got.iter_mut().enumerate() {
+        for (value, channel) in values.iter_mut().zip(["r", "g", "b"]) {
+            *value += points.number(row, &format!("seE_{channel}"));
+        }
+    }
+    rms(&got, &want)
+}
+
 /// RMS relative error over points and channels; a NaN that is wanted is left out, one that was got makes the result NaN.
 pub fn rms(got: &[[f64; 3]], want: &[[f64; 3]]) -> f64 {
     let (mut sum, mut count) = (0.0, 0u32);
@@ -98,5 +115,18 @@ mod tests {
         crate::assert_close("rms", rms(&got, &want), 0.1, crate::Tolerance::Rel(1e-12));
         assert!(rms(&[[f64::NAN; 3]; 2], &want).is_nan());
         assert!(rms(&[], &[]).is_nan());
+    }
+
+    #[test]
+    fn noise_of_given_points_is_their_standard_error() {
+        let table = |header: &str, cells: [&str; 2]| Table {
+            header: header.split(',').map(str::to_owned).collect(),
+            rows: cells.map(|row| row.split(',').map(str::to_owned).collect()).to_vec(),
+        };
+        let rows = ["1,2,4,0.01,0.02,0.04", "1,2,4,0.01,0.02,0.4"];
+        // The last standard error is a tenth of its value: that value is not trusted.
+        let noise = given_noise(&table("E_r,E_g,E_b,seE_r,seE_g,seE_b", rows));
+        crate::assert_close("noise", noise, 0.01, crate::Tolerance::Rel(1e-9));
+        assert!(given_noise(&table("E_r,E_g,E_b", ["1,2,4", "1,2,4"])).is_nan());
     }
 }

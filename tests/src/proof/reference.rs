@@ -1,9 +1,11 @@
 //! The reference a scene's runs are held against: the pipeline at a finer error than any that is measured, and how far
-//! that itself may be off, from its distance to a run at twice its error and from given independent answers.
+//! that itself may be off, from its distance to a run at twice its error and from given independent answers. Both runs are what the
+//! pipeline does by default, so they are rows of the table as well.
 
 use super::errors;
 use super::plan::{Case, scene_file};
-use super::runner::{case_commands, run_commands};
+use super::record::{self, Row};
+use super::runner::{Outcome, case_commands, run_commands};
 use crate::table::Table;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -19,8 +21,19 @@ pub struct Reference {
     pub irradiance: Vec<[f64; 3]>,
     /// How far points and picture are from those of a run at twice the error.
     pub own_error: [f64; 2],
-    /// RMS distance to the given answers, whose own errors are a few parts in ten thousand.
+    /// RMS distance to the given answers.
     pub given_error: f64,
+    /// What the standard errors of those alone would make of it.
+    pub given_noise: f64,
+    /// The run itself and the one at twice its error, with these.
+    pub runs: [(f64, Outcome); 2],
+}
+
+impl Reference {
+    /// The run at `error`, where it is one of the reference's own two.
+    pub fn run_at(&self, error: f64) -> Option<&Outcome> {
+        self.runs.iter().find(|(own, _)| (own / error - 1.0).abs() < 1e-9).map(|(_, run)| run)
+    }
 }
 
 /// The given answers of a scene.
@@ -31,42 +44,58 @@ pub fn given_points(scene: &str) -> Option<Table> {
 }
 
 /// Makes the reference of a scene at `error` in `work`, or takes the one that an earlier call left there for the same
-/// programs. Nothing where it takes longer than `budget`.
+/// programs. Nothing where one of its two runs takes longer than `budget`.
 pub fn make(scene: &str, work: &Path, error: f64, budget: Duration) -> Option<Reference> {
     let kept = work.join("reference");
     std::fs::create_dir_all(&kept).unwrap_or_else(|e| panic!("{}: {e}", kept.display()));
-    let fine = keep(scene, work, &kept, error, budget)?;
+    // The cheaper one first: where that fails, so would the other.
     let coarse = keep(scene, work, &kept, 2.0 * error, budget)?;
+    let fine = keep(scene, work, &kept, error, budget)?;
     let points = given_points(scene);
     let probed = |prefix: &Path| points.as_ref().and_then(|p| errors::probe(prefix, p)).unwrap_or_default();
-    let irradiance = probed(&fine);
+    let irradiance = probed(&fine.prefix);
     let given_error = points.as_ref().map_or(f64::NAN, |p| errors::rms(&irradiance, &errors::given(p)));
-    let exr = |prefix: &Path| prefix.with_extension("exr");
-    let own_error = [errors::rms(&probed(&coarse), &irradiance), errors::picture(&exr(&coarse), &exr(&fine))];
-    Some(Reference { prefix: fine, points, irradiance, own_error, given_error })
+    let given_noise = points.as_ref().map_or(f64::NAN, errors::given_noise);
+    let exr = |run: &Outcome| run.prefix.with_extension("exr");
+    let own_error =
+        [errors::rms(&probed(&coarse.prefix), &irradiance), errors::picture(&exr(&coarse), &exr(&fine))];
+    let (prefix, runs) = (fine.prefix.clone(), [(error, fine), (2.0 * error, coarse)]);
+    Some(Reference { prefix, points, irradiance, own_error, given_error, given_noise, runs })
 }
 
-/// The files of one run of the pipeline, made where they are not there.
-fn keep(scene: &str, work: &Path, kept: &Path, error: f64, budget: Duration) -> Option<PathBuf> {
+/// One run of the pipeline with what it cost, made where it is not there.
+fn keep(scene: &str, work: &Path, kept: &Path, error: f64, budget: Duration) -> Option<Outcome> {
     let case = Case { scene: scene.to_owned(), method: "auto", mesh: "discontinuity", error };
     let (prefix, commands) = case_commands(&case, work, "reference-run");
     let folder = kept.join(format!("{scene}_{error}_{}", super::runner::key(&case, &commands, work)));
-    let name = prefix.file_name().expect("a name");
-    if folder.join(name).with_extension("exr").exists() {
-        return Some(folder.join(name));
+    let kept_prefix = folder.join(prefix.file_name().expect("a name"));
+    if let (true, Some(row)) =
+        (kept_prefix.with_extension("exr").exists(), record::read(&folder.join(COST)).pop())
+    {
+        let Row { state, costs, elements, .. } = row;
+        return Some(Outcome { state, costs, elements, prefix: kept_prefix });
     }
     let done = run_commands(&prefix, &commands, budget);
-    eprintln!("proof: reference of {scene} at {error}: {}", done.state);
+    let (cpu, wall) = done.costs.iter().fold((0.0, 0.0), |(cpu, wall), c| (cpu + c.cpu_s, wall + c.wall_s));
+    println!("reference of {scene} at {error}: {}, {cpu:.0} CPU s, {wall:.0} s on the clock", done.state);
     if done.state != "done" {
         return None;
     }
     let _ = std::fs::remove_dir_all(&folder);
     let made = prefix.parent().expect("a folder");
-    std::fs::rename(made, &folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let (state, costs, elements) = (done.state.clone(), done.costs, done.elements);
+    record::write(
+        &made.join(COST),
+        &[Row { scene: scene.to_owned(), asked: error, state, costs, elements, ..Row::default() }],
+    );
     // The matrix is the largest file, and nothing is compared with it.
-    let _ = std::fs::remove_file(folder.join(name).with_extension("ff"));
-    Some(folder.join(name))
+    let _ = std::fs::remove_file(prefix.with_extension("ff"));
+    std::fs::rename(made, &folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    Some(Outcome { prefix: kept_prefix, ..done })
 }
+
+/// Name of the file beside a kept run that says what it cost.
+const COST: &str = "cost.csv";
 
 /// The matrix of a box at `tolerance` (its quads are the elements).
 pub fn matrix(scene: &str, work: &Path, tolerance: f64) -> PathBuf {

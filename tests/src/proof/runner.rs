@@ -28,7 +28,7 @@ pub fn commands(scene: &Path, out: &Path, error: f64, variables: &[String]) -> V
 /// What a run of a case gave.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// `done`, `over budget in STAGE` or `failed in STAGE: ...`.
+    /// `done`, `over the budget of N s in STAGE` or `failed in STAGE: ...`.
     pub state: String,
     /// Cost of mesh, matrix, solution and picture.
     pub costs: [Cost; 4],
@@ -72,6 +72,11 @@ fn size_wanted(scene: &Path, work: &Path, error: f64) -> (f64, f64) {
     (report(&given)["estimates"]["area of faces"].as_f64().expect("an area in the mesh's report"), elements)
 }
 
+/// How the state of a case begins that was not run, or not to its end, because it takes longer than `budget_s`.
+pub fn over(budget_s: f64) -> String {
+    format!("over the budget of {budget_s:.0} s")
+}
+
 /// Runs the commands one after another, all of them together for at most `budget`.
 pub fn run_commands(prefix: &Path, commands: &[String], budget: Duration) -> Outcome {
     let folder = prefix.parent().expect("outputs lie in a folder");
@@ -86,7 +91,7 @@ pub fn run_commands(prefix: &Path, commands: &[String], budget: Duration) -> Out
         let name = ["mesh", "form factors", "solution", "picture"][stage];
         match measure(&mut command, &output, budget.saturating_sub(start.elapsed())) {
             End::Done(taken) => *cost = taken,
-            End::OverBudget => state = format!("over budget in {name}"),
+            End::OverBudget => state = format!("{} in {name}", over(budget.as_secs_f64())),
             End::Failed(said) => state = format!("failed in {name}: {}", said.replace([',', '"'], ";")),
         }
         if state != "done" {
