@@ -15,9 +15,7 @@ use std::time::Duration;
 pub struct Reference {
     /// Beginning of its files.
     pub prefix: PathBuf,
-    /// Given points, where there are some.
-    pub points: Option<Table>,
-    /// Irradiance at them.
+    /// Irradiance at the given points, where there are some.
     pub irradiance: Vec<[f64; 3]>,
     /// How far points and picture are from those of a run at twice the error.
     pub own_error: [f64; 2],
@@ -60,7 +58,7 @@ pub fn make(scene: &str, work: &Path, error: f64, budget: Duration) -> Option<Re
     let own_error =
         [errors::rms(&probed(&coarse.prefix), &irradiance), errors::picture(&exr(&coarse), &exr(&fine))];
     let (prefix, runs) = (fine.prefix.clone(), [(error, fine), (2.0 * error, coarse)]);
-    Some(Reference { prefix, points, irradiance, own_error, given_error, given_noise, runs })
+    Some(Reference { prefix, irradiance, own_error, given_error, given_noise, runs })
 }
 
 /// One run of the pipeline with what it cost, made where it is not there.
