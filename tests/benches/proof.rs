@@ -183,7 +183,7 @@ fn row_of(case: &Case, key: &str) -> Row {
         method: case.method.to_owned(),
         mesh: case.mesh.to_owned(),
         asked: case.error,
-        errors: [f64::NAN; 5],
+        errors: [f64::NAN; 6],
         ..Row::default()
     }
 }
@@ -206,6 +206,8 @@ fn compare(row: &mut Row, prefix: &Path, reference: Option<&Reference>) {
     }
     let exr = |prefix: &Path| prefix.with_extension("exr");
     row.errors[2] = reference.map_or(f64::NAN, |r| errors::picture(&exr(prefix), &exr(&r.prefix)));
+    row.errors[5] = reference
+        .map_or(f64::NAN, |r| errors::surfaces(&exr(prefix), &exr(&r.prefix), plan::lamp(&row.scene)));
 }
 
 /// What is to be known of a scene's reference.
@@ -217,18 +219,28 @@ fn note(scene: &str, reference: Option<&Reference>) -> String {
                 .to_owned()
         }
         None => format!("{scene}: no reference within the budget."),
-        Some(r) => format!(
-            "{scene}: the reference, made at {}, is {:.1e} (points) and {:.1e} (picture) from a run at twice that; {:.1e} from \
-             the given answers{}. Errors that are less than ten times the first two are uncertain by them.",
-            r.runs[0].0,
-            r.own_error[0],
-            r.own_error[1],
-            r.given_error,
-            match r.given_noise {
-                noise if noise.is_finite() => format!(", whose standard errors alone make {noise:.1e}"),
-                _ => String::new(),
+        Some(r) => {
+            let mut text = format!(
+                "{scene}: the reference, made at {}, is {:.1e} (points), {:.1e} (picture) and {:.1e} (surfaces) from a run at \
+                 twice that. Errors that are less than ten times these are uncertain by them. It is {:.1e} from the given points",
+                r.runs[0].0, r.own_error[0], r.own_error[1], r.own_error[2], r.given_error,
+            );
+            if r.given_noise.is_finite() {
+                text += &format!(", whose standard errors alone make {:.1e}", r.given_noise);
             }
-        ),
+            if let Some([error, noise]) = r.given_picture {
+                text += &if error > 0.0 {
+                    format!(
+                        ", and {error:.1e} from the given picture's surfaces, whose noise of {noise:.1e} is taken off in quadrature"
+                    )
+                } else {
+                    format!(
+                        ", and no farther from the given picture's surfaces than their noise of {noise:.1e}"
+                    )
+                };
+            }
+            text + "."
+        }
     }
 }
 
