@@ -3,10 +3,14 @@
 use crate::programs::{Run, run, tool};
 use crate::table::Table;
 use serde_json::Value;
+use shade_tool::exr_reader::StoredPicture;
+use shade_tool::picture::Picture;
 use std::path::Path;
 
 /// Values below this part of the mean count as this much: a dark point does not decide a relative error.
 const FLOOR: f64 = 0.01;
+/// The same for pixels of surfaces.
+const DARK: f64 = 0.05;
 /// Points whose given standard error is above this part of their value are left out.
 const TRUSTED: f64 = 0.02;
 
@@ -89,6 +93,37 @@ pub fn picture(first: &Path, second: &Path) -> f64 {
     squares.filter(|s| !s.is_empty()).map_or(f64::NAN, |s| (s.iter().sum::<f64>() / s.len() as f64).sqrt())
 }
 
+/// RMS relative error over pixels and channels of what is no lamp: pixels above `lamp` in `reference`, whose borders cross pixels, and
+/// their eight neighbours are left out. NaN where a picture cannot be read or the sizes differ.
+pub fn surfaces(picture: &Path, reference: &Path, lamp: f64) -> f64 {
+    let read = |path: &Path| StoredPicture::read(path).map_err(|e| eprintln!("proof: {e}"));
+    match (read(picture), read(reference)) {
+        (Ok(got), Ok(want)) => surfaces_of(&got.picture, &want.picture, lamp),
+        _ => f64::NAN,
+    }
+}
+
+fn surfaces_of(got: &Picture, want: &Picture, lamp: f64) -> f64 {
+    let (width, height) = (want.width, want.height);
+    if (got.width, got.height) != (width, height) {
+        return f64::NAN;
+    }
+    let shines = |x: usize, y: usize| want.pixels[y * width + x].iter().any(|&value| value > lamp);
+    let around = |at: usize, size: usize| at.saturating_sub(1)..size.min(at + 2);
+    let near_lamp =
+        |i: usize| around(i / width, height).any(|y| around(i % width, width).any(|x| shines(x, y)));
+    let kept: Vec<usize> = (0..want.pixels.len()).filter(|&i| !near_lamp(i)).collect();
+    let mut squares = 0.0;
+    for channel in 0..3 {
+        let mean = kept.iter().map(|&i| want.pixels[i][channel]).sum::<f64>() / kept.len().max(1) as f64;
+        for &i in &kept {
+            let value = want.pixels[i][channel];
+            squares += ((got.pixels[i][channel] - value) / value.max(DARK * mean)).powi(2);
+        }
+    }
+    (squares / (3.0 * kept.len() as f64)).sqrt()
+}
+
 /// Mean and worst over rows of the sum over j of |difference of F_ij|.
 pub fn rows(first: &Path, second: &Path) -> [f64; 2] {
     let mut compare = tool("formfactor-tool");
@@ -115,6 +150,21 @@ mod tests {
         crate::assert_close("rms", rms(&got, &want), 0.1, crate::Tolerance::Rel(1e-12));
         assert!(rms(&[[f64::NAN; 3]; 2], &want).is_nan());
         assert!(rms(&[], &[]).is_nan());
+    }
+
+    #[test]
+    fn pixels_at_lamps_do_not_count_and_dark_ones_count_as_a_twentieth_of_the_mean() {
+        let picture = |pixels: [f64; 5]| Picture {
+            width: 5,
+            height: 1,
+            pixels: pixels.map(|x| [x; 3]).to_vec(),
+            ..Picture::default()
+        };
+        let want = picture([9.0, 1.0, 1.0, 2.0, 0.0]);
+        // The mean of the last three is 1, so the black one is off by 0.01 / 0.05; the one beside the lamp is left out.
+        let error = surfaces_of(&picture([7.0, 3.0, 1.1, 1.8, 0.01]), &want, 4.0);
+        crate::assert_close("surfaces", error, (0.06f64 / 3.0).sqrt(), crate::Tolerance::Rel(1e-12));
+        assert!(surfaces_of(&Picture::default(), &want, 4.0).is_nan());
     }
 
     #[test]

@@ -117,6 +117,11 @@ pub fn reference_error(scene: &str) -> f64 {
     if scene == "room" { 0.005 } else { 0.001 }
 }
 
+/// Radiance above which a pixel sees a lamp.
+pub fn lamp(scene: &str) -> f64 {
+    if scene == "room" { 4.0 } else { 1.5 }
+}
+
 /// Names of all scenes, the slowest last.
 pub fn scenes() -> Vec<String> {
     let boxes = boxes::BLOCKERS.iter().flat_map(|k| boxes::SIZES.map(|n| format!("box{k}-{n}")));

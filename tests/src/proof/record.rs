@@ -7,7 +7,7 @@ use std::path::Path;
 /// Columns of the CSV.
 pub const HEADER: &str = "key,commit,scene,method,mesh,asked,state,elements,mesh_cpu_s,mesh_wall_s,ff_cpu_s,ff_wall_s,\
 sol_cpu_s,sol_wall_s,exr_cpu_s,exr_wall_s,peak_bytes,mesh_bytes,ff_bytes,sol_bytes,exr_bytes,points_error,\
-points_given_error,picture_error,row_error_mean,row_error_worst";
+points_given_error,picture_error,row_error_mean,row_error_worst,surfaces_error";
 
 /// A measured case, or one that was not run.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -31,8 +31,8 @@ pub struct Row {
     /// Cost of mesh, matrix, solution and picture.
     pub costs: [Cost; 4],
     /// RMS relative error at the points against our reference, against the given one, of the picture; mean and worst
-    /// row error of the matrix. NaN where it does not apply.
-    pub errors: [f64; 5],
+    /// row error of the matrix; RMS relative error of pixels away from lamps. NaN where it does not apply.
+    pub errors: [f64; 6],
 }
 
 impl Row {
@@ -41,9 +41,9 @@ impl Row {
         self.costs.iter().map(|cost| cost.cpu_s).sum()
     }
 
-    /// The error its curve is drawn over: the picture's, the points' where there is none, or the rows' mean.
+    /// The error its curve is drawn over: that of pixels away from lamps, the points' where there is no picture, or the rows' mean.
     pub fn main_error(&self) -> f64 {
-        [2, 0, 3].into_iter().map(|i| self.errors[i]).find(|e| e.is_finite()).unwrap_or(f64::NAN)
+        [5, 0, 3].into_iter().map(|i| self.errors[i]).find(|e| e.is_finite()).unwrap_or(f64::NAN)
     }
 
     fn cells(&self) -> Vec<String> {
@@ -65,7 +65,7 @@ impl Row {
             (cost.cpu_s, cost.wall_s) = (number(8 + 2 * i)?, number(9 + 2 * i)?);
             (cost.peak_bytes, cost.file_bytes) = (number(16)? as u64, number(17 + i)? as u64);
         }
-        let mut errors = [f64::NAN; 5];
+        let mut errors = [f64::NAN; 6];
         for (i, error) in errors.iter_mut().enumerate() {
             *error = number(21 + i)?;
         }
@@ -105,7 +105,7 @@ mod tests {
             asked: 0.02,
             state: "done".into(),
             costs: [Cost { cpu_s: 1.5, wall_s: 0.75, peak_bytes: 7, file_bytes: 9 }; 4],
-            errors: [0.5, 0.25, 0.125, 0.0625, 1.0],
+            errors: [0.5, 0.25, 0.125, 0.0625, 1.0, 2.0],
             ..Row::default()
         };
         write(&path, &[row.clone(), row.clone()]);

@@ -3,7 +3,7 @@
 //! pipeline does by default, so they are rows of the table as well.
 
 use super::errors;
-use super::plan::{Case, scene_file};
+use super::plan::{self, Case, scene_file};
 use super::record::{self, Row};
 use super::runner::{Outcome, case_commands, run_commands};
 use crate::table::Table;
@@ -15,16 +15,16 @@ use std::time::Duration;
 pub struct Reference {
     /// Beginning of its files.
     pub prefix: PathBuf,
-    /// Given points, where there are some.
-    pub points: Option<Table>,
-    /// Irradiance at them.
+    /// Irradiance at the given points, where there are some; NaN where those are not sure enough to be compared with.
     pub irradiance: Vec<[f64; 3]>,
-    /// How far points and picture are from those of a run at twice the error.
-    pub own_error: [f64; 2],
+    /// How far points, picture and pixels away from lamps are from those of a run at twice the error.
+    pub own_error: [f64; 3],
     /// RMS distance to the given answers.
     pub given_error: f64,
     /// What the standard errors of those alone would make of it.
     pub given_noise: f64,
+    /// How far pixels away from lamps are from the given picture, whose noise, the second number, is taken off.
+    pub given_picture: Option<[f64; 2]>,
     /// The run itself and the one at twice its error, with these.
     pub runs: [(f64, Outcome); 2],
 }
@@ -43,6 +43,18 @@ pub fn given_points(scene: &str) -> Option<Table> {
     path.exists().then(|| Table::read(&path))
 }
 
+/// The given picture of a scene, path traced, and the RMS relative standard error of its pixels.
+fn given_picture(scene: &str) -> Option<(PathBuf, f64)> {
+    let noise = match scene {
+        "cornell_empty" => 0.0313,
+        "goral_cube" => 0.0474,
+        "cornell_blocks" => 0.0221,
+        "room" => 0.0238,
+        _ => return None,
+    };
+    Some((crate::reference(&format!("{scene}.exr")), noise))
+}
+
 /// Makes the reference of a scene at `error` in `work`, or takes the one that an earlier call left there for the same
 /// programs. Nothing where one of its two runs takes longer than `budget`.
 pub fn make(scene: &str, work: &Path, error: f64, budget: Duration) -> Option<Reference> {
@@ -53,14 +65,24 @@ pub fn make(scene: &str, work: &Path, error: f64, budget: Duration) -> Option<Re
     let fine = keep(scene, work, &kept, error, budget)?;
     let points = given_points(scene);
     let probed = |prefix: &Path| points.as_ref().and_then(|p| errors::probe(prefix, p)).unwrap_or_default();
-    let irradiance = probed(&fine.prefix);
+    let mut irradiance = probed(&fine.prefix);
     let given_error = points.as_ref().map_or(f64::NAN, |p| errors::rms(&irradiance, &errors::given(p)));
+    for (own, given) in irradiance.iter_mut().zip(points.as_ref().map(errors::given).unwrap_or_default()) {
+        *own = std::array::from_fn(|c| if given[c].is_finite() { own[c] } else { f64::NAN });
+    }
     let given_noise = points.as_ref().map_or(f64::NAN, errors::given_noise);
     let exr = |run: &Outcome| run.prefix.with_extension("exr");
-    let own_error =
-        [errors::rms(&probed(&coarse.prefix), &irradiance), errors::picture(&exr(&coarse), &exr(&fine))];
+    let own_error = [
+        errors::rms(&probed(&coarse.prefix), &irradiance),
+        errors::picture(&exr(&coarse), &exr(&fine)),
+        errors::surfaces(&exr(&coarse), &exr(&fine), plan::lamp(scene)),
+    ];
+    let given_picture = given_picture(scene).map(|(path, noise)| {
+        let error = errors::surfaces(&exr(&fine), &path, plan::lamp(scene));
+        [(error * error - noise * noise).max(0.0).sqrt(), noise]
+    });
     let (prefix, runs) = (fine.prefix.clone(), [(error, fine), (2.0 * error, coarse)]);
-    Some(Reference { prefix, points, irradiance, own_error, given_error, given_noise, runs })
+    Some(Reference { prefix, irradiance, own_error, given_error, given_noise, given_picture, runs })
 }
 
 /// One run of the pipeline with what it cost, made where it is not there.

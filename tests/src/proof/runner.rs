@@ -7,6 +7,7 @@ use crate::programs::{TOOLS, program, run};
 use interchange::digest::Digest;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 /// Commands of the stages, one line each, as the pipeline would run them in a new folder; those of other make variables
@@ -107,10 +108,11 @@ pub fn run_commands(prefix: &Path, commands: &[String], budget: Duration) -> Out
 pub fn key(case: &Case, commands: &[String], work: &Path) -> String {
     let mut text = format!("{case:?}\n");
     let scene = scene_file(&case.scene, work);
-    for file in TOOLS.map(program).into_iter().chain(["obj", "mtl", "toml"].map(|e| scene.with_extension(e)))
-    {
-        text += &format!("{}\n", Digest::of(&std::fs::read(file).unwrap_or_default()));
-    }
+    // The programs, 100 MB of them, stay the same as long as this one runs: read once for the hundreds of cases.
+    static PROGRAMS: OnceLock<[String; 4]> = OnceLock::new();
+    let digest = |file: PathBuf| format!("{}\n", Digest::of(&std::fs::read(file).unwrap_or_default()));
+    PROGRAMS.get_or_init(|| TOOLS.map(program).map(digest)).iter().for_each(|line| text += line);
+    ["obj", "mtl", "toml"].iter().for_each(|e| text += &digest(scene.with_extension(e)));
     let (work, folder) = (work.display().to_string(), program(TOOLS[0]));
     let folder = folder.parent().map(|f| f.display().to_string()).unwrap_or_default();
     commands.iter().for_each(|line| text += &line.replace(&work, "").replace(&folder, ""));
