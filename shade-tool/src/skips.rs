@@ -35,11 +35,12 @@ const FAINT: f64 = 0.25;
 pub fn opening(turned_off: &[Skip], tolerance: Option<f64>, level: f64) -> Opening {
     let far = tolerance.map_or(0.0, |tolerance| (SHARE * tolerance / ERROR_OF_FAR).cbrt().min(FARTHEST));
     let blur = tolerance.map_or(0.0, |tolerance| SHARE_OF_SOURCE * tolerance * level);
+    let blur = if turned_off.contains(&Skip::Joined) { 0.0 } else { blur };
     Opening {
         far: if turned_off.contains(&Skip::Far) { 0.0 } else { far },
-        blur: if turned_off.contains(&Skip::Joined) { 0.0 } else { blur },
+        blur,
         hidden: !turned_off.contains(&Skip::Hidden),
-        faint: if turned_off.contains(&Skip::Faint) { 0.0 } else { FAINT },
+        faint: if turned_off.contains(&Skip::Faint) || blur == 0.0 { 0.0 } else { FAINT },
     }
 }
 
