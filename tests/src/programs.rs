@@ -47,10 +47,8 @@ fn build(folder: &Path) -> Result<(), String> {
     };
     let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     cargo.current_dir(crate::root()).args(["build", "--quiet", "--profile", profile]);
-    cargo.arg("--target-dir").arg(folder.parent().expect("a target folder"));
-    TOOLS.iter().for_each(|tool| {
-        cargo.args(["-p", tool]);
-    });
+    // All of the workspace: by themselves the programs' dependencies have other features, and would be built once more.
+    cargo.arg("--workspace").arg("--target-dir").arg(folder.parent().expect("a target folder"));
     let done = run(&mut cargo);
     if done.code == Some(0) { Ok(()) } else { Err(done.stderr) }
 }
