@@ -2,7 +2,7 @@
 //!
 //! A cluster beneath the point's horizon, turned away from it, or wholly behind one body gives nothing; a shadow that
 //! does not touch a cluster is not asked again for its elements, nor is a border of it that the cluster lies inside of.
-//! What is left is exact, element by element.
+//! What is left is exact, element by element, unless who asks for it takes a part by its middle.
 
 use crate::body::{Body, bodies};
 use crate::element_tree::{Element, ElementTree};

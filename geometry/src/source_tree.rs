@@ -3,6 +3,7 @@
 //! As [`crate::gather`], but where an error is allowed a flat, unblocked cluster seen under a small angle is not opened: its
 //! sources count by their moments, Taylor's series of the kernel to second order (as far blocks in hierarchical radiosity, Hanrahan,
 //! Salzman & Aupperle 1991, but with the field's variation inside the cluster instead of its mean).
+//! What gives too little to matter by itself is seen or not by its middle ([`Opening::faint`]).
 //!
 //! # Precision
 //! An unopened cluster of radius R at distance d is off by a few (R / d)^3 of its own share: see [`SourceTree::gather`].
